@@ -28,7 +28,7 @@ class FieldGuidedPlan:
     sequence: tuple[int, ...]
     """UAV indices by the ranks that the lists were flown with."""
     n_left_out: int
-    """Required tasks on no list that some UAV could do as its only one."""
+    """Open tasks without due_s that are on no list, whether somebody could do them or not."""
     objective: float
     """Σ of eq. 1 over the lists flown together, from the state on [value·s]."""
     iterations: int

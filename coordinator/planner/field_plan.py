@@ -6,7 +6,7 @@ due time left out, then largest J). Pop-ups are unknown to a plan.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,17 +29,13 @@ from coordinator.planner.sequence_search import Progress
 from swarm.allocation import Rule
 from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.problem import FloatArray
-from swarm.kernels.field import FIELD_GREEDY, FIELD_LOOKAHEAD, FieldRuleCode, FlownLists, fly_lists
+from swarm.allocation.field.rules import FIELD_RULES
+from swarm.kernels.field import FlownLists, fly_lists
 from swarm.model import Mission, Plan, TaskId
 from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError
 
-FIELD_RULES: Mapping[str, FieldRuleCode] = {
-    "greedy": FIELD_GREEDY,
-    "lookahead": FIELD_LOOKAHEAD,
-}
-"""Rules that heed the field's constraints."""
 FIELD_METHODS = (*FIELD_RULES, "guided", "exact")
 _PROOF_S = 1.0
 """The optimum is proven beside any method when that is estimated to take at most this long."""

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from swarm.allocation.field.problem import FieldProblem
+from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.problem import FloatArray, Problem
 from swarm.kernels.field import FlownLists
 from swarm.kernels.field_alone import earliest_alone
@@ -125,7 +125,7 @@ def left_out(problem: FieldProblem, done: Sequence[int]) -> Mapping[TaskId, Left
     missing = np.setdiff1d(np.arange(problem.n_task), np.asarray(done, dtype=np.int64))
     if not len(missing):
         return {}
-    alone_s = earliest_alone(problem.kernel, problem.first_s)
+    alone_s = earliest_alone(problem.kernel, FieldState.at_start(problem))
     somebody_can = np.any(np.isfinite(alone_s), axis=0)
     reasons = {}
     for task in missing.tolist():

@@ -159,8 +159,13 @@ struct FieldTeam {
     const double* survived;          // (n_uav,)
     const std::uint8_t* active;      // (n_uav,)
     const std::uint8_t* open;        // (n_task,)
-    const std::int32_t* landed_at;   // (n_uav,) base at which it stands ready, and holds a slot; or -1
+    const std::int32_t* landed_at;   // (n_uav,) base at which it stands ready when it is free; or -1
     const std::int64_t* rank;        // (n_uav,) place in the sequence
+    const double* arrives_s = nullptr;  // (n_uav,) above that base: -infinity, it stands on a slot;
+                                        // infinity, beside the slots. Null: all stand on slots
+    const std::int32_t* leaving = nullptr;  // (n_uav,) base on a slot of which it waits for its
+                                            // departure to what it does before it is free; or -1
+    const double* leaves_s = nullptr;       // (n_uav,) when that is
 
     Progress begin(const FieldProblem& problem, int uav) const {
         Progress progress;
@@ -169,6 +174,26 @@ struct FieldTeam {
         progress.legs_s = first_s + static_cast<std::size_t>(uav) * problem.n_node;
         progress.landed = landed_at[uav] >= 0;
         progress.survived = survived[uav];
+        return progress;
+    }
+
+    // Whether it has yet to find a slot at the base where it is to stand.
+    bool is_bound(int uav) const {
+        return landed_at[uav] >= 0 && arrives_s != nullptr && std::isfinite(arrives_s[uav]);
+    }
+    bool stands_on_slot(int uav) const {
+        return landed_at[uav] >= 0 &&
+               (arrives_s == nullptr ||
+                arrives_s[uav] == -std::numeric_limits<double>::infinity());
+    }
+    int leaving_base(int uav) const { return leaving == nullptr ? -1 : leaving[uav]; }
+
+    // Of who has yet to find a slot: above that base.
+    Progress above_base(const FieldProblem& problem, int uav) const {
+        Progress progress = begin(problem, uav);
+        progress.time_s = arrives_s[uav];
+        progress.legs_s = problem.legs_from(uav, problem.base_node(landed_at[uav]));
+        progress.landed = false;
         return progress;
     }
 };

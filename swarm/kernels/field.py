@@ -86,6 +86,18 @@ class FieldTeamArrays(Protocol):
     def rank(self) -> _Ranks:
         """(n_uav,) place in the sequence."""
 
+    @property
+    def arrives_s(self) -> _Floats:
+        """(n_uav,) above that base, if it has no slot yet [s]."""
+
+    @property
+    def leaving(self) -> _Ints:
+        """(n_uav,) base on a slot of which it waits for a departure, or -1."""
+
+    @property
+    def leaves_s(self) -> _Floats:
+        """(n_uav,) when that is [s]."""
+
 
 class FlownLists(NamedTuple):
     """The schedules of lists; rows of items are those of all lists, one after the other."""
@@ -165,13 +177,24 @@ def run_rule(
     team: FieldTeamArrays,
     rule: FieldRuleCode,
     should_stop: Callable[[], bool] | None = None,
+    *,
+    first: int | None = None,
 ) -> FieldRuns:
     """All decisions from ``team`` on, each when its UAV is free; once it is to stop, no more.
 
     The lists that they make can be flown, and every visit to a base is followed by a task: who
     flew to a base in vain goes home instead.
+
+    Args:
+        problem: what it is about.
+        team: where it stands.
+        rule: by which all decide.
+        should_stop: asked every few milliseconds.
+        first: a UAV whose first decision alone is of interest. Then it ends when that one is
+            certain; some that are told after it are not.
     """
-    return FieldRuns(*_kernels.field_run_rule(problem, *_arrays(team), rule, should_stop))
+    of = -1 if first is None else first
+    return FieldRuns(*_kernels.field_run_rule(problem, *_arrays(team), rule, of, should_stop))
 
 
 def decide(
@@ -187,7 +210,9 @@ def decide(
 
 def _arrays(
     team: FieldTeamArrays,
-) -> tuple[_Floats, _Floats, _Floats, _Floats, _Bools, _Bools, _Ints, _Ranks]:
+) -> tuple[
+    _Floats, _Floats, _Floats, _Floats, _Bools, _Bools, _Ints, _Ranks, _Floats, _Ints, _Floats
+]:
     return (
         team.free_s,
         team.sortie_end_s,
@@ -197,4 +222,7 @@ def _arrays(
         team.open,
         team.landed_at,
         team.rank,
+        team.arrives_s,
+        team.leaving,
+        team.leaves_s,
     )

@@ -1,6 +1,8 @@
 // When each UAV has done each task at the earliest, if that is its only one; see field_alone.py.
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <limits>
 #include <utility>
 #include <vector>
@@ -31,6 +33,7 @@ void do_each(const FieldProblem& problem, int uav, const Progress& origin, doubl
 // Dijkstra over the bases: who is ready earlier can do whatever one could that is ready later, as
 // it may wait on the ground.
 void do_alone(const FieldProblem& problem, int uav, const Progress& start, double* end_s) {
+    if (!std::isfinite(start.time_s)) return;
     do_each(problem, uav, start, end_s);
     if (problem.full_s[uav] == kNever) return;  // there is nothing to swap
     std::vector<Progress> ready(static_cast<std::size_t>(problem.n_base));
@@ -60,19 +63,17 @@ void do_alone(const FieldProblem& problem, int uav, const Progress& start, doubl
     }
 }
 
-Out<double, 2> earliest_alone(const BoundField& given, In<double, 1> first_s) {
-    const FieldProblem& problem = given.problem;
+Out<double, 2> earliest_alone(const BoundField& field, const BoundFieldTeam& given) {
+    const FieldProblem& problem = field.problem;
+    const FieldTeam team = given.checked(problem);
     const auto n_uav = static_cast<std::size_t>(problem.n_uav);
     const auto n_task = static_cast<std::size_t>(problem.n_task);
-    require_shape("first_s", first_s, {n_uav});
     std::vector<double> end_s(n_uav * n_task, kNever);
     {
         nb::gil_scoped_release unlocked;
         for (int uav = 0; uav < problem.n_uav; ++uav) {
-            Progress start;
-            start.sortie_end_s = first_s.data()[uav];
-            start.legs_s = problem.legs_from(uav, uav);
-            do_alone(problem, uav, start, end_s.data() + problem.at(uav, 0));
+            if (!team.active[uav]) continue;
+            do_alone(problem, uav, team.begin(problem, uav), end_s.data() + problem.at(uav, 0));
         }
     }
     const std::size_t shape[2] = {n_uav, n_task};
@@ -82,8 +83,18 @@ Out<double, 2> earliest_alone(const BoundField& given, In<double, 1> first_s) {
 }  // namespace
 
 void bind_field_alone(nb::module_& module) {
-    module.def("earliest_alone", &earliest_alone, nb::arg("problem"),
-               nb::arg("first_s").noconvert());
+    module.def(
+        "earliest_alone",
+        [](const BoundField& problem, In<double, 1> free_s, In<double, 1> sortie_end_s,
+           In<double, 2> first_s, In<double, 1> survived, In<bool, 1> active, In<bool, 1> open,
+           In<std::int32_t, 1> landed_at, In<std::int64_t, 1> rank) {
+            return earliest_alone(
+                problem, {free_s, sortie_end_s, first_s, survived, active, open, landed_at, rank});
+        },
+        nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("sortie_end_s").noconvert(),
+        nb::arg("first_s").noconvert(), nb::arg("survived").noconvert(),
+        nb::arg("active").noconvert(), nb::arg("open").noconvert(),
+        nb::arg("landed_at").noconvert(), nb::arg("rank").noconvert());
 }
 
 }  // namespace peckorder

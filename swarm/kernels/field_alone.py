@@ -6,18 +6,27 @@ import numpy as np
 import numpy.typing as npt
 
 from swarm.kernels import _kernels
+from swarm.kernels.field import FieldTeamArrays
 
-FloatArray = npt.NDArray[np.float64]
 
-
-def earliest_alone(problem: _kernels.KernelField, first_s: FloatArray) -> FloatArray:
+def earliest_alone(problem: _kernels.KernelField, team: FieldTeamArrays) -> npt.NDArray[np.float64]:
     """(n_uav, n_task) earliest end of each task as its UAV's only one [s]; infinite: it can't.
 
-    From its start at mission time 0 on, over as many bases as it takes, with every slot free.
+    From where the team stands on, over as many bases as it takes, with every slot free. Who takes
+    no part can do nothing; which tasks are open is not asked.
 
     Args:
         problem: the field's problem.
-        first_s: (n_uav,) airborne time of the sortie that begins at mission time 0 [s].
+        team: where it stands.
     """
-    found: FloatArray = _kernels.earliest_alone(problem, first_s)
-    return found
+    return _kernels.earliest_alone(
+        problem,
+        team.free_s,
+        team.sortie_end_s,
+        team.first_s,
+        team.survived,
+        team.active,
+        team.open,
+        team.landed_at,
+        team.rank,
+    )

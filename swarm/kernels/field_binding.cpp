@@ -151,9 +151,21 @@ FieldTeam BoundFieldTeam::checked(const FieldProblem& problem, int decider) cons
         }
     }
     require_numbers("survived", survived, 0.0, 1.0, "within 0..1");
-    require_numbers("landed_at", landed_at, -1, problem.n_base - 1, "indices of bases, or -1");
-    return {free_s.data(),    sortie_end_s.data(), first_s.data(),   survived.data(),
-            bytes_of(active), bytes_of(open),      landed_at.data(), rank.data()};
+    const char* const bases = "indices of bases, or -1";
+    require_numbers("landed_at", landed_at, -1, problem.n_base - 1, bases);
+    FieldTeam team{free_s.data(),    sortie_end_s.data(), first_s.data(),   survived.data(),
+                   bytes_of(active), bytes_of(open),      landed_at.data(), rank.data()};
+    if (arrives_s.data() == nullptr) return team;
+    require_shape("arrives_s", arrives_s, {n_uav});
+    require_shape("leaving", leaving, {n_uav});
+    require_shape("leaves_s", leaves_s, {n_uav});
+    require_numbers("arrives_s", arrives_s, -kEndless, kEndless, "times, not NaN");
+    require_numbers("leaving", leaving, -1, problem.n_base - 1, bases);
+    require_numbers("leaves_s", leaves_s, -kMost, kMost, "finite times");
+    team.arrives_s = arrives_s.data();
+    team.leaving = leaving.data();
+    team.leaves_s = leaves_s.data();
+    return team;
 }
 
 void bind_field(nb::module_& module) {

@@ -40,6 +40,9 @@ struct BoundFieldTeam {
     In<bool, 1> active, open;
     In<std::int32_t, 1> landed_at;
     In<std::int64_t, 1> rank;
+    In<double, 1> arrives_s{};  // these three are left out where slots are no concern
+    In<std::int32_t, 1> leaving{};
+    In<double, 1> leaves_s{};
 
     // A view, once shapes and numbers are checked; legs only of who is to decide, if one is.
     FieldTeam checked(const FieldProblem& problem, int decider = -1) const;

@@ -11,9 +11,6 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
-
 from swarm.kernels import _kernels
 from swarm.kernels._kernels import KernelField
 from swarm.kernels.field import FieldTeamArrays
@@ -118,17 +115,6 @@ def best_list(
         problem, _as_tuple(team), uav, should_stop
     )
     return OwnFieldList(ProofOutcome(outcome), n_left_out, objective, tuple(items))
-
-
-def can_do_alone(problem: KernelField, team: FieldTeamArrays) -> npt.NDArray[np.bool_]:
-    """Whether a UAV could do a task as its only one, with as many swaps as it takes.
-
-    Every slot is taken to be free. Who takes no part can do nothing.
-
-    Returns:
-        (n_uav, n_task).
-    """
-    return _kernels.field_can_do_alone(problem, _as_tuple(team))
 
 
 def _as_tuple(team: FieldTeamArrays) -> tuple[Any, ...]:

@@ -91,29 +91,6 @@ std::tuple<int, int, double, FieldList> own_best(const BoundField& field, const 
     return {static_cast<int>(best.outcome), best.n_left_out, best.value, std::move(best.list)};
 }
 
-Out<bool, 2> alone(const BoundField& field, const TeamTuple& given) {
-    const FieldProblem& problem = field.problem;
-    const BoundFieldTeam arrays = bound_team(given);
-    const FieldTeam team = arrays.checked(problem);
-    const Size n_uav = static_cast<Size>(problem.n_uav), n_task = static_cast<Size>(problem.n_task);
-    std::vector<std::uint8_t> can(n_uav * n_task, 0);
-    {
-        const nb::gil_scoped_release released;
-        for (int uav = 0; uav < problem.n_uav; ++uav) {
-            if (!team.active[uav] || !std::isfinite(team.free_s[uav])) continue;
-            for (int task = 0; task < problem.n_task; ++task) {
-                can[problem.at(uav, task)] = can_do_alone(
-                    problem, uav, team.begin(problem, uav), team.landed_at[uav], task);
-            }
-        }
-    }
-    auto* kept = new std::vector<std::uint8_t>(std::move(can));
-    nb::capsule owner(kept,
-                      [](void* p) noexcept { delete static_cast<std::vector<std::uint8_t>*>(p); });
-    const Size shape[2] = {n_uav, n_task};
-    return Out<bool, 2>(reinterpret_cast<bool*>(kept->data()), 2, shape, owner);
-}
-
 }  // namespace
 
 void bind_field_exact(nb::module_& module) {
@@ -122,7 +99,6 @@ void bind_field_exact(nb::module_& module) {
                nb::arg("threads"), nb::arg("should_stop") = nb::none());
     module.def("field_best_list", &own_best, nb::arg("problem"), nb::arg("team"), nb::arg("uav"),
                nb::arg("should_stop") = nb::none());
-    module.def("field_can_do_alone", &alone, nb::arg("problem"), nb::arg("team"));
 }
 
 }  // namespace peckorder

@@ -317,47 +317,6 @@ FieldList OwnLists::list(TaskSet set) const {
     return {at(offset_[set]), at(offset_[set + 1])};
 }
 
-// From a base one departs as late as the opening allows, so being ready early never harms with one
-// task: the earliest readiness at every base is enough to look at.
-bool can_do_alone(const FieldProblem& problem, int uav, const Progress& begin, int landed_at,
-                  int task) {
-    const Size n_base = static_cast<Size>(problem.n_base);
-    std::vector<Progress> ready(n_base);
-    std::vector<std::uint8_t> known(n_base, 0), seen(n_base, 0);
-    Times times;
-    const auto look_from = [&](const Progress& from, int here) {
-        for (int back = 0; back <= problem.is_line[task]; ++back) {
-            Progress progress = from;
-            if (do_task(problem, uav, item_of_task(task, back), progress, times) ==
-                Refusal::kNone) {
-                return true;
-            }
-        }
-        if (!std::isfinite(problem.full_s[uav])) return false;
-        for (int base = 0; base < problem.n_base; ++base) {
-            Progress progress = from;
-            const Item item = item_of_base(base);
-            if (base == here || seen[base]) continue;
-            if (do_item(problem, uav, item, progress, times) != Refusal::kNone) continue;
-            if (known[base] && ready[base].time_s <= progress.time_s) continue;
-            known[base] = 1;
-            ready[base] = progress;
-        }
-        return false;
-    };
-    if (look_from(begin, landed_at)) return true;
-    for (;;) {
-        int next = -1;
-        for (int base = 0; base < problem.n_base; ++base) {
-            if (!known[base] || seen[base]) continue;
-            if (next < 0 || ready[base].time_s < ready[next].time_s) next = base;
-        }
-        if (next < 0) return false;
-        seen[next] = 1;
-        if (look_from(ready[next], next)) return true;
-    }
-}
-
 OwnBest best_list(const OwnQuestion& question, Watch& watch) {
     const OwnLists lists(question, watch);
     OwnBest best;

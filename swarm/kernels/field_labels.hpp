@@ -67,11 +67,6 @@ class OwnLists {
     Outcome outcome_ = Outcome::kProven;
 };
 
-// Whether that UAV could do `task` as its only one, with as many swaps as it takes and all slots
-// free.
-bool can_do_alone(const FieldProblem& problem, int uav, const Progress& begin, int landed_at,
-                  int task);
-
 // The best list of one UAV over some tasks by (fewest required left out, largest J), as if it were
 // alone; slots are no concern.
 struct OwnBest {

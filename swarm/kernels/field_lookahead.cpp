@@ -125,8 +125,7 @@ class Improvement {
     std::int64_t steps_ = 0;
 };
 
-}  // namespace
-
+// Tasks of `open` that the UAV is capable of.
 std::vector<int> able_for(const FieldProblem& problem, int uav, const std::vector<int>& open) {
     std::vector<int> able;
     for (const int task : open) {
@@ -135,21 +134,25 @@ std::vector<int> able_for(const FieldProblem& problem, int uav, const std::vecto
     return able;
 }
 
+}  // namespace
+
 OwnPlan own_plan(const FieldProblem& problem, int uav, const Progress& begin, int landed_at,
-                 const std::vector<int>& open, bool may_swap, const FieldList& begin_with) {
+                 const std::vector<int>& open, bool may_swap,
+                 const std::function<FieldList()>& begin_with) {
     const std::vector<int> able = able_for(problem, uav, open);
     if (able.size() <= static_cast<std::size_t>(kExactOwnTasks)) {
         const BaseUse use = may_swap ? BaseUse::kFree : BaseUse::kForbidden;
         OwnQuestion question{&problem, uav, begin, landed_at, able,
                              std::vector<BaseUse>(problem.n_base, use)};
         question.begin.value = 0.0;
-        Watch never;
-        const OwnBest best = best_list(question, never);
+        std::int64_t most = kMostExactSteps / Watch::kStepsBetween;
+        Watch watch([&] { return --most <= 0; });
+        const OwnBest best = best_list(question, watch);
         if (best.outcome == Outcome::kProven) return {best.list, best.value, true};
     }
     Progress from = begin;
     from.value = 0.0;
-    return Improvement(problem, uav, from, landed_at, able, may_swap, begin_with).run();
+    return Improvement(problem, uav, from, landed_at, able, may_swap, begin_with()).run();
 }
 
 }  // namespace peckorder

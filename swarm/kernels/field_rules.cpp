@@ -11,6 +11,7 @@ namespace peckorder {
 namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
+constexpr int kMostRuns = 200;
 
 // Of some ten nanoseconds, about as many as a decision takes.
 std::int64_t steps_of(FieldRule rule, std::size_t n_open) {
@@ -28,9 +29,16 @@ void BaseTraffic::reset(const FieldProblem& problem, const FieldTeam& team) {
         if (slots < problem.n_uav) limit_[base] = slots;  // more are as good as no limit
     }
     for (int uav = 0; uav < problem.n_uav; ++uav) {
+        const int leaving = team.leaving_base(uav);
+        if (leaving >= 0 && limited(leaving)) hold(uav, leaving, team.leaves_s[uav]);
         const int base = team.landed_at[uav];
         if (base < 0 || !limited(base)) continue;
-        hold(uav, base, team.active[uav] ? team.free_s[uav] : kNever);
+        if (team.stands_on_slot(uav)) {
+            hold(uav, base, team.active[uav] ? team.free_s[uav] : kNever);
+        } else if (team.is_bound(uav) && team.active[uav]) {
+            approach(uav, base, {team.arrives_s[uav], team.rank[uav], uav},
+                     team.sortie_end_s[uav]);
+        }
     }
 }
 
@@ -96,12 +104,9 @@ FieldChoice FieldDecider::by_greedy(const FieldView& view, BaseTraffic& traffic,
 FieldChoice FieldDecider::lookahead(const FieldView& view, BaseTraffic& traffic, Swaps swaps) {
     const FieldProblem& problem = view.problem;
     const bool may_swap = swaps != Swaps::kNever;
-    FieldList begin_with;
-    if (able_for(problem, view.uav, view.open).size() > static_cast<std::size_t>(kExactOwnTasks)) {
-        begin_with = greedy_list(view, may_swap);
-    }
     const OwnPlan plan =
-        own_plan(problem, view.uav, view.progress, view.here, view.open, may_swap, begin_with);
+        own_plan(problem, view.uav, view.progress, view.here, view.open, may_swap,
+                 [&] { return greedy_list(view, may_swap); });
     if (plan.list.empty()) return {};
     if (is_base(plan.list.front()) && swaps == Swaps::kLater) {
         return lookahead(view, traffic, Swaps::kNever);
@@ -259,11 +264,12 @@ void FieldRun::push(double time_s, Kind kind, int uav) {
 }
 
 void FieldRun::run(const FieldProblem& problem, const FieldTeam& team, FieldRule rule,
-                   Watch& watch) {
-    most_items_.assign(problem.n_uav, std::numeric_limits<int>::max());
+                   Watch& watch, int first) {
+    bars_.clear();
+    n_run_ = 0;
     do {
-        once(problem, team, rule, watch);
-    } while (shortened() && !watch.stopped());
+        once(problem, team, rule, watch, first);
+    } while (!watch.stopped() && bar_a_visit());
     if (!watch.stopped()) return;
     for (auto last = decisions_.end(); last != decisions_.begin();) {
         Uav& self = uavs_[(--last)->uav];
@@ -273,19 +279,35 @@ void FieldRun::run(const FieldProblem& problem, const FieldTeam& team, FieldRule
     }
 }
 
-// Whether someone flew to a base in vain; from there on it visits no more.
-bool FieldRun::shortened() {
+// Whether someone flew to a base in vain; the earliest such visit is barred from now on. Bars of
+// later visits are lifted, for what comes after this one changes, unless that has gone on for long.
+bool FieldRun::bar_a_visit() {
     bool any = false;
-    for (std::size_t uav = 0; uav < uavs_.size(); ++uav) {
-        if (uavs_[uav].n_since_task == 0) continue;
-        most_items_[uav] = uavs_[uav].n_item - uavs_[uav].n_since_task;
+    Bar earliest{};
+    for (int uav = 0; uav < static_cast<int>(uavs_.size()); ++uav) {
+        const Uav& self = uavs_[uav];
+        if (self.n_since_task == 0) continue;
+        const Bar bar{self.visit_s, rank_[uav], uav, self.n_item - self.n_since_task};
+        if (!any || bar < earliest) earliest = bar;
         any = true;
     }
-    return any;
+    if (!any) return false;
+    if (++n_run_ <= kMostRuns) {
+        bars_.erase(std::remove_if(bars_.begin(), bars_.end(),
+                                   [&](const Bar& bar) { return earliest < bar; }),
+                    bars_.end());
+    }
+    bars_.push_back(earliest);
+    return true;
 }
 
-void FieldRun::once(const FieldProblem& problem, const FieldTeam& team, FieldRule rule,
-                    Watch& watch) {
+bool FieldRun::barred(int uav) const {
+    return std::any_of(bars_.begin(), bars_.end(), [&](const Bar& bar) {
+        return bar.uav == uav && bar.n_item == uavs_[uav].n_item;
+    });
+}
+
+void FieldRun::begin(const FieldProblem& problem, const FieldTeam& team) {
     rank_ = team.rank;
     open_.clear();
     for (int task = 0; task < problem.n_task; ++task) {
@@ -297,13 +319,31 @@ void FieldRun::once(const FieldProblem& problem, const FieldTeam& team, FieldRul
     uavs_.clear();
     events_.clear();
     decisions_.clear();
+    decided_.assign(problem.n_uav, 0);
+    n_in_vain_ = 0;
     for (int uav = 0; uav < problem.n_uav; ++uav) {
-        uavs_.push_back({team.begin(problem, uav), 0, 0, team.landed_at[uav]});
-        if (team.active[uav] && team.free_s[uav] < kNever) {
+        const int base = team.landed_at[uav];
+        uavs_.push_back({team.begin(problem, uav), 0, 0, base, base >= 0});
+        const int leaving = team.leaving_base(uav);
+        if (leaving >= 0 && traffic_.limited(leaving)) {
+            push(team.leaves_s[uav], Kind::kRelease, uav);
+        }
+        if (!team.active[uav] || team.free_s[uav] == kNever) continue;
+        if (team.is_bound(uav) && traffic_.limited(base)) {
+            uavs_.back().progress = team.above_base(problem, uav);
+            push(team.arrives_s[uav], Kind::kArrival, uav);
+        } else {
             push(team.free_s[uav], Kind::kDecision, uav);
         }
     }
-    while (!events_.empty()) {
+}
+
+void FieldRun::once(const FieldProblem& problem, const FieldTeam& team, FieldRule rule,
+                    Watch& watch, int first) {
+    begin(problem, team);
+    // A visit that turns out to be in vain is undone, and all that came after it; so what is decided
+    // is certain as soon as no visit is open.
+    while (!events_.empty() && !(first >= 0 && decided_[first] && n_in_vain_ == 0)) {
         std::pop_heap(events_.begin(), events_.end(), later);
         const Event event = events_.back();
         events_.pop_back();
@@ -327,15 +367,16 @@ void FieldRun::decide(const FieldProblem& problem, FieldRule rule, int uav, Watc
     const double now_s = self.progress.time_s;
     const int here = self.progress.landed ? self.base : -1;
     // As many swaps in a row as there are bases lead everywhere.
-    const Swaps swaps = self.n_item >= most_items_[uav]        ? Swaps::kNever
-                        : self.n_since_task >= problem.n_base ? Swaps::kLater
-                                                               : Swaps::kNow;
+    const Swaps swaps = barred(uav) ? Swaps::kNever
+                        : self.n_before + self.n_since_task >= problem.n_base ? Swaps::kLater
+                                                                              : Swaps::kNow;
+    decided_[uav] = 1;
     FieldChoice choice;
     if (!watch.stops_after(steps_of(rule, open_.size()))) {
         choice = decider_.decide(rule, {problem, open_, uav, rank_[uav], self.progress, here},
                                  traffic_, swaps);
     }
-    const bool holds = here >= 0 && traffic_.limited(here);
+    const bool holds = traffic_.holds(uav);
     if (choice.home) {
         if (holds) release(problem, uav);
         return;
@@ -345,7 +386,8 @@ void FieldRun::decide(const FieldProblem& problem, FieldRule rule, int uav, Watc
     if (!is_base(choice.item)) {
         const int task = task_of(choice.item);
         do_task(problem, uav, choice.item, self.progress, choice.times);
-        self.n_since_task = 0;
+        n_in_vain_ -= self.n_since_task > 0;
+        self.n_since_task = self.n_before = 0;
         open_.erase(std::lower_bound(open_.begin(), open_.end(), task));
         push(self.progress.time_s, Kind::kDecision, uav);
         if (!holds) return;
@@ -358,6 +400,10 @@ void FieldRun::decide(const FieldProblem& problem, FieldRule rule, int uav, Watc
         return;
     }
     if (holds) release(problem, uav);
+    if (self.n_since_task == 0) {
+        ++n_in_vain_;
+        self.visit_s = now_s;
+    }
     ++self.n_since_task;
     self.base = base_of(choice.item);
     const double arrive_s = arrival_s(problem, self.base, self.progress);

@@ -6,6 +6,7 @@
 #pragma once
 
 #include <cstdint>
+#include <tuple>
 #include <vector>
 
 #include "field.hpp"
@@ -39,6 +40,7 @@ class BaseTraffic {
     void hold(int uav, int base, double until_s);  // it has touched down
     void stays(int uav, double until_s) { at_[uav].until_s = until_s; }
     void leave(int uav);  // of a holder
+    bool holds(int uav) const { return at_[uav].stage == Stage::kHolding; }
     int base_of_holder(int uav) const { return at_[uav].base; }
     double until_s(int uav) const { return at_[uav].until_s; }
 
@@ -108,9 +110,12 @@ struct FieldDecision {
 // A whole run, by lists that `TeamFlights` flies alike.
 class FieldRun {
  public:
-    // Every base visit of the lists is followed by a task: who flew to a base in vain is let go home
-    // instead, and all begin anew. Told to stop, all go home from where they are.
-    void run(const FieldProblem& problem, const FieldTeam& team, FieldRule rule, Watch& watch);
+    // Every base visit of the lists is followed by a task: the earliest visit in vain is barred, and
+    // all go on anew from there. So a run from any state that a run has passed goes on like it. Told
+    // to stop, all go home from where they are. Asked for what `first` decides first, or goes home,
+    // it ends when that is certain.
+    void run(const FieldProblem& problem, const FieldTeam& team, FieldRule rule, Watch& watch,
+             int first = -1);
 
     const std::vector<FieldDecision>& decisions() const { return decisions_; }  // in their order
 
@@ -126,10 +131,26 @@ class FieldRun {
         Progress progress;
         int n_item, n_since_task;  // on its list; visits to bases at its end
         int base;                  // to which it flies, or where it stands; or -1
+        int n_before = 0;          // visits to bases that it began with, no task since
+        double visit_s = 0.0;      // when it decided on the first of the visits at its end
+    };
+    // A visit that was in vain: at its `n_item`-th decision that UAV may fly to no base.
+    struct Bar {
+        double time_s;
+        std::int64_t rank;
+        int uav, n_item;
+
+        bool operator<(const Bar& other) const {
+            return std::tie(time_s, rank, uav, n_item) <
+                   std::tie(other.time_s, other.rank, other.uav, other.n_item);
+        }
     };
 
-    void once(const FieldProblem& problem, const FieldTeam& team, FieldRule rule, Watch& watch);
-    bool shortened();
+    void once(const FieldProblem& problem, const FieldTeam& team, FieldRule rule, Watch& watch,
+              int first);
+    void begin(const FieldProblem& problem, const FieldTeam& team);
+    bool bar_a_visit();
+    bool barred(int uav) const;
     void push(double time_s, Kind kind, int uav);
     void decide(const FieldProblem& problem, FieldRule rule, int uav, Watch& watch);
     void touch_down(const FieldProblem& problem, int uav, double begin_s);
@@ -137,10 +158,14 @@ class FieldRun {
     static bool later(const Event& a, const Event& b);
 
     std::vector<Uav> uavs_;
-    std::vector<int> open_, most_items_;
+    std::vector<int> open_;
+    std::vector<Bar> bars_;
+    int n_run_ = 0;
     std::vector<std::vector<int>> waiting_;  // by base, in the order of arrival
     std::vector<Event> events_;              // a heap, the next one first
     std::vector<FieldDecision> decisions_;
+    std::vector<std::uint8_t> decided_;      // (n_uav,)
+    int n_in_vain_ = 0;                      // UAVs whose last visit no task follows so far
     const std::int64_t* rank_ = nullptr;
     BaseTraffic traffic_;
     FieldDecider decider_;

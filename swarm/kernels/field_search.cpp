@@ -224,8 +224,12 @@ void FieldLane::believe_stays(int uav) {
 void FieldLane::believe_stays(int uav, const Times* times, std::size_t count) {
     if (!any_limited_) return;
     own_stays_.clear();
-    int base = team_.landed_at[uav];
-    double arrive_s = -kInfinity;
+    const int leaving = team_.leaving_base(uav);
+    if (leaving >= 0 && stays_.limited(leaving))
+        own_stays_.push_back({leaving, -kInfinity, team_.leaves_s[uav]});
+    const bool bound = team_.active[uav] && team_.is_bound(uav);
+    int base = bound || team_.stands_on_slot(uav) ? team_.landed_at[uav] : -1;
+    double arrive_s = bound ? team_.arrives_s[uav] : -kInfinity;
     double end_s = idle_until_s(team_, uav);
     for (std::size_t k = 0; k < count; ++k) {
         if (base >= 0 && stays_.limited(base))

@@ -41,7 +41,7 @@ class SearchedLists:
     lists: tuple[tuple[int, ...], ...]
     """Items per UAV: 2k for task k forwards, 2k + 1 backwards, -1 - b for base b."""
     n_left_out: int
-    """Required tasks on no list that some UAV could do as its only one."""
+    """Open tasks without due_s that are on no list."""
     objective: float
     """J of eq. 1 of all lists flown together [value·s]."""
     iterations: int
@@ -99,15 +99,21 @@ def optimise_lists(
         team.open,
         team.landed_at,
         team.rank,
+        team.arrives_s,
+        team.leaving,
+        team.leaves_s,
         *_flat(begin, n_uav),
         seed,
     )
     kernel_threads = default_threads() if threads is None else threads
     done = _anneal(search, int(np.sum(team.open)), iterations, spent_frac, progress, kernel_threads)
-    n_left_out, objective = search.best_worth()
+    objective = search.best_worth()[1]
     flat, offsets = search.best()
     items = flat.tolist()
     found = tuple(tuple(items[a:b]) for a, b in pairwise(offsets.tolist()))
+    listed = [item >> 1 for item in items if item >= 0]
+    wanted = problem.required & team.open
+    n_left_out = int(wanted.sum() - wanted[listed].sum())
     return SearchedLists(found, n_left_out, objective, done)
 
 

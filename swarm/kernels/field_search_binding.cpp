@@ -75,17 +75,18 @@ void bind_field_search(nb::module_& module) {
             [](BoundFieldSearch* self, const BoundField& problem, In<double, 1> free_s,
                In<double, 1> sortie_end_s, In<double, 2> first_s, In<double, 1> survived,
                In<bool, 1> active, In<bool, 1> open, In<std::int32_t, 1> landed_at,
-               In<std::int64_t, 1> rank, In<std::int32_t, 1> items, In<std::int64_t, 1> offsets,
+               In<std::int64_t, 1> rank, In<double, 1> arrives_s, In<std::int32_t, 1> leaving,
+               In<double, 1> leaves_s, In<std::int32_t, 1> items, In<std::int64_t, 1> offsets,
                std::uint64_t seed) {
                 new (self) BoundFieldSearch(problem,
                                             {free_s, sortie_end_s, first_s, survived, active, open,
-                                             landed_at, rank},
+                                             landed_at, rank, arrives_s, leaving, leaves_s},
                                             items, offsets, seed);
             },
             nb::keep_alive<1, 2>(), nb::arg("problem"), nb::arg("free_s"), nb::arg("sortie_end_s"),
             nb::arg("first_s"), nb::arg("survived"), nb::arg("active"), nb::arg("open"),
-            nb::arg("landed_at"), nb::arg("rank"), nb::arg("items"), nb::arg("offsets"),
-            nb::arg("seed"))
+            nb::arg("landed_at"), nb::arg("rank"), nb::arg("arrives_s"), nb::arg("leaving"),
+            nb::arg("leaves_s"), nb::arg("items"), nb::arg("offsets"), nb::arg("seed"))
         .def("round", &BoundFieldSearch::round, nb::arg("iterations"), nb::arg("heat"),
              nb::arg("threads"), nb::arg("should_stop") = nb::none())
         .def("gather", &BoundFieldSearch::gather)

@@ -40,9 +40,10 @@ bool TeamFlights::fly(const FieldProblem& problem, const FieldTeam& team, const 
     arrivals_.clear();
     slots_.reset(problem);
     take_slots_of_landed(problem, team, lists);
+    approach(problem, team);
     bool all = true;
     for (int uav = 0; uav < problem.n_uav; ++uav) {
-        if (lists[uav].count == 0) continue;
+        if (lists[uav].count == 0 || bound_[uav]) continue;
         if (team.active[uav] && team.free_s[uav] < kNever) {
             all &= fly_on(problem, team, lists[uav], uav);
         } else {
@@ -56,7 +57,7 @@ bool TeamFlights::fly(const FieldProblem& problem, const FieldTeam& team, const 
         const Arrival arrival = arrivals_.back();
         arrivals_.pop_back();
         const ItemList& list = lists[arrival.uav];
-        all &= serve(problem, list, arrival) && fly_on(problem, team, list, arrival.uav);
+        all &= serve(problem, team, list, arrival) && fly_on(problem, team, list, arrival.uav);
         if (whole && !all) return false;
     }
     return all;
@@ -68,14 +69,33 @@ double TeamFlights::value() const {
     return value;
 }
 
+// Who is bound for a base with slots is served there in its turn.
+void TeamFlights::approach(const FieldProblem& problem, const FieldTeam& team) {
+    bound_.assign(problem.n_uav, 0);
+    for (int uav = 0; uav < problem.n_uav; ++uav) {
+        if (!team.active[uav] || !team.is_bound(uav) || !slots_.limited(team.landed_at[uav])) {
+            continue;
+        }
+        bound_[uav] = 1;
+        flights_[uav].progress = team.above_base(problem, uav);
+        arrivals_.push_back({team.arrives_s[uav], team.rank[uav], uav});
+        std::push_heap(arrivals_.begin(), arrivals_.end(), later);
+    }
+}
+
 // Who stands at a base holds a slot until it departs, or for good if it takes no part. More of them
 // than slots are others that wait for their turn: each after one that is ready earlier.
 void TeamFlights::take_slots_of_landed(const FieldProblem& problem, const FieldTeam& team,
                                        const ItemList* lists) {
     landed_.clear();
     for (int uav = 0; uav < problem.n_uav; ++uav) {
+        const int leaving = team.leaving_base(uav);
+        if (leaving >= 0 && slots_.limited(leaving)) {
+            double& slot_s = slots_.earliest(leaving);
+            slot_s = std::max(slot_s, team.leaves_s[uav]);
+        }
         const int base = team.landed_at[uav];
-        if (base < 0 || !slots_.limited(base)) continue;
+        if (!team.stands_on_slot(uav) || !slots_.limited(base)) continue;
         landed_.push_back({team.free_s[uav], team.rank[uav], uav});
     }
     std::sort(landed_.begin(), landed_.end());
@@ -122,20 +142,26 @@ void TeamFlights::go_home(const FieldProblem& problem, const ItemList& list, int
     flight.home_arrive_s = flight.home_depart_s + problem.home_time_s(uav, node);
 }
 
-bool TeamFlights::serve(const FieldProblem& problem, const ItemList& list, const Arrival& arrival) {
+bool TeamFlights::serve(const FieldProblem& problem, const FieldTeam& team, const ItemList& list,
+                        const Arrival& arrival) {
     FieldFlight& flight = flights_[arrival.uav];
-    const int base = base_of(list.items[flight.done]);
+    const bool bound = bound_[arrival.uav];
+    const int base = bound ? team.landed_at[arrival.uav] : base_of(list.items[flight.done]);
     double& slot_s = slots_.earliest(base);
     const double begin_s = std::max(arrival.arrive_s, slot_s);
-    Times& times = times_[first_[arrival.uav] + flight.done];
-    flight.refusal = begin_s < kNever ? swap_battery(problem, arrival.uav, base, begin_s,
-                                                     flight.progress, times)
-                                      : Refusal::kEnergy;
-    if (flight.refusal != Refusal::kNone) {
+    Times landing{};
+    Times& times = bound ? landing : times_[first_[arrival.uav] + flight.done];
+    const Refusal refusal = begin_s < kNever ? swap_battery(problem, arrival.uav, base, begin_s,
+                                                            flight.progress, times)
+                                             : Refusal::kEnergy;
+    bound_[arrival.uav] = 0;
+    if (refusal != Refusal::kNone) {
+        if (list.count == 0) return true;  // without anything to do it is nobody's concern
+        flight.refusal = refusal;
         go_home(problem, list, arrival.uav);
         return false;
     }
-    ++flight.done;
+    if (!bound) ++flight.done;
     slot_s = flight.done < list.count
                  ? departure_s(problem, flight.progress, list.items[flight.done])
                  : flight.progress.time_s;

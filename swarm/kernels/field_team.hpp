@@ -61,7 +61,7 @@ class TeamFlights {
  public:
     // Fly (n_uav,) `lists` from where the team stands; true: every item can be done. Told that it is
     // to be `whole`, it ends at the first that can't be. Inactive UAVs do nothing; one that stands
-    // at a base keeps its slot.
+    // at a base keeps its slot. Who is bound for a base lands there first, without a list too.
     bool fly(const FieldProblem& problem, const FieldTeam& team, const ItemList* lists,
              bool whole = false);
 
@@ -71,15 +71,18 @@ class TeamFlights {
     double value() const;  // of all, added up by index
 
  private:
+    void approach(const FieldProblem& problem, const FieldTeam& team);
     void take_slots_of_landed(const FieldProblem& problem, const FieldTeam& team,
                               const ItemList* lists);
     bool fly_on(const FieldProblem& problem, const FieldTeam& team, const ItemList& list, int uav);
     void go_home(const FieldProblem& problem, const ItemList& list, int uav);
-    bool serve(const FieldProblem& problem, const ItemList& list, const Arrival& arrival);
+    bool serve(const FieldProblem& problem, const FieldTeam& team, const ItemList& list,
+               const Arrival& arrival);
 
     std::vector<int> first_;
     std::vector<Times> times_;
     std::vector<FieldFlight> flights_;
+    std::vector<std::uint8_t> bound_;  // (n_uav,) it has yet to land before its first item
     std::vector<Arrival> arrivals_;  // a heap, the earliest one first
     std::vector<Arrival> landed_;
     SlotTable slots_;

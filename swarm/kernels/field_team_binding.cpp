@@ -96,13 +96,15 @@ Flown fly_lists(const BoundField& field, const BoundFieldTeam& given,
 using Run = std::tuple<Out<std::int32_t, 1>, Out<std::int32_t, 1>, Out<double, 1>, Out<double, 2>,
                        Out<double, 2>>;
 
-Run run_rule(const BoundField& field, const BoundFieldTeam& given, int rule_code,
+Run run_rule(const BoundField& field, const BoundFieldTeam& given, int rule_code, int first,
              nb::handle should_stop) {
     const FieldProblem& problem = field.problem;
     const FieldRule rule = checked_rule(rule_code);
+    if (first < -1 || first >= problem.n_uav) refuse("first must be an index of a UAV, or -1");
     const FieldTeam team = given.checked(problem);
     FieldRun run;
-    PythonWatch(should_stop).released([&](Watch& watch) { run.run(problem, team, rule, watch); });
+    PythonWatch(should_stop).released(
+        [&](Watch& watch) { run.run(problem, team, rule, watch, first); });
     std::vector<std::int32_t> uavs, items;
     std::vector<double> decided_s, times, scores;
     for (const FieldDecision& decision : run.decisions()) {
@@ -162,44 +164,54 @@ void bind_field_team(nb::module_& module) {
         "field_fly_lists",
         [](const BoundField& problem, Floats free_s, Floats sortie_end_s, In<double, 2> first_s,
            Floats survived, In<bool, 1> active, In<bool, 1> open, In<std::int32_t, 1> landed_at,
-           In<std::int64_t, 1> rank, In<std::int32_t, 1> flat, In<std::int64_t, 1> offsets) {
-            return fly_lists(
-                problem, {free_s, sortie_end_s, first_s, survived, active, open, landed_at, rank},
-                flat, offsets);
+           In<std::int64_t, 1> rank, Floats arrives_s, In<std::int32_t, 1> leaving, Floats leaves_s,
+           In<std::int32_t, 1> flat, In<std::int64_t, 1> offsets) {
+            return fly_lists(problem,
+                             {free_s, sortie_end_s, first_s, survived, active, open, landed_at,
+                              rank, arrives_s, leaving, leaves_s},
+                             flat, offsets);
         },
         nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("sortie_end_s").noconvert(),
         nb::arg("first_s").noconvert(), nb::arg("survived").noconvert(),
         nb::arg("active").noconvert(), nb::arg("open").noconvert(),
         nb::arg("landed_at").noconvert(), nb::arg("rank").noconvert(),
-        nb::arg("flat").noconvert(), nb::arg("offsets").noconvert());
+        nb::arg("arrives_s").noconvert(), nb::arg("leaving").noconvert(),
+        nb::arg("leaves_s").noconvert(), nb::arg("flat").noconvert(), nb::arg("offsets").noconvert());
     module.def(
         "field_run_rule",
         [](const BoundField& problem, Floats free_s, Floats sortie_end_s, In<double, 2> first_s,
            Floats survived, In<bool, 1> active, In<bool, 1> open, In<std::int32_t, 1> landed_at,
-           In<std::int64_t, 1> rank, int rule, nb::handle should_stop) {
-            return run_rule(
-                problem, {free_s, sortie_end_s, first_s, survived, active, open, landed_at, rank},
-                rule, should_stop);
+           In<std::int64_t, 1> rank, Floats arrives_s, In<std::int32_t, 1> leaving, Floats leaves_s,
+           int rule, int first, nb::handle should_stop) {
+            return run_rule(problem,
+                            {free_s, sortie_end_s, first_s, survived, active, open, landed_at,
+                             rank, arrives_s, leaving, leaves_s},
+                            rule, first, should_stop);
         },
         nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("sortie_end_s").noconvert(),
         nb::arg("first_s").noconvert(), nb::arg("survived").noconvert(),
         nb::arg("active").noconvert(), nb::arg("open").noconvert(),
-        nb::arg("landed_at").noconvert(), nb::arg("rank").noconvert(), nb::arg("rule"),
+        nb::arg("landed_at").noconvert(), nb::arg("rank").noconvert(),
+        nb::arg("arrives_s").noconvert(), nb::arg("leaving").noconvert(),
+        nb::arg("leaves_s").noconvert(), nb::arg("rule"), nb::arg("first"),
         nb::arg("should_stop") = nb::none());
     module.def(
         "field_decide",
         [](const BoundField& problem, Floats free_s, Floats sortie_end_s, In<double, 2> first_s,
            Floats survived, In<bool, 1> active, In<bool, 1> open, In<std::int32_t, 1> landed_at,
-           In<std::int64_t, 1> rank, int uav, int rule) {
-            return decide(
-                problem, {free_s, sortie_end_s, first_s, survived, active, open, landed_at, rank},
-                uav, rule);
+           In<std::int64_t, 1> rank, Floats arrives_s, In<std::int32_t, 1> leaving, Floats leaves_s,
+           int uav, int rule) {
+            return decide(problem,
+                          {free_s, sortie_end_s, first_s, survived, active, open, landed_at, rank,
+                           arrives_s, leaving, leaves_s},
+                          uav, rule);
         },
         nb::arg("problem"), nb::arg("free_s").noconvert(), nb::arg("sortie_end_s").noconvert(),
         nb::arg("first_s").noconvert(), nb::arg("survived").noconvert(),
         nb::arg("active").noconvert(), nb::arg("open").noconvert(),
-        nb::arg("landed_at").noconvert(), nb::arg("rank").noconvert(), nb::arg("uav"),
-        nb::arg("rule"));
+        nb::arg("landed_at").noconvert(), nb::arg("rank").noconvert(),
+        nb::arg("arrives_s").noconvert(), nb::arg("leaving").noconvert(),
+        nb::arg("leaves_s").noconvert(), nb::arg("uav"), nb::arg("rule"));
 }
 
 }  // namespace peckorder

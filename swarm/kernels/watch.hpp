@@ -27,9 +27,9 @@ class Watch {
 
   bool stopped() const { return stopped_.load(std::memory_order_relaxed); }
 
- private:
   static constexpr std::int64_t kStepsBetween = 200'000;
 
+ private:
   std::function<bool()> should_stop_;
   std::atomic<std::int64_t> steps_{0};
   std::atomic<bool> stopped_{false};

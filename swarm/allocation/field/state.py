@@ -6,7 +6,8 @@ Leaves out: what is on its list, and when it does it (swarm.kernels.field).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -28,7 +29,14 @@ _ARRAYS: tuple[tuple[str, type[np.generic], int], ...] = (
     ("open", np.bool_, 1),
     ("landed_at", np.int32, 1),
     ("rank", np.int64, 1),
+    ("arrives_s", np.float64, 1),
+    ("leaving", np.int32, 1),
+    ("leaves_s", np.float64, 1),
 )
+
+
+def _unknown() -> npt.NDArray[Any]:
+    return np.empty(0)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,8 +65,25 @@ class FieldState:
     slot until it departs; -1: it is in the air."""
     rank: RankArray
     """(n_uav,) place in the sequence: of two at one instant the smaller goes first."""
+    arrives_s: FloatArray = field(default_factory=_unknown)
+    """(n_uav,) of who has yet to find a slot at that base, when it arrives above it [s]; then
+    ``free_s`` is a prediction. -infinity: it holds one, as all do by default; infinity: it stands
+    beside them."""
+    leaving: IntArray = field(default_factory=_unknown)
+    """(n_uav,) base on a slot of which it waits for its departure to what it does before it is
+    free; -1, as by default: none."""
+    leaves_s: FloatArray = field(default_factory=_unknown)
+    """(n_uav,) when it departs there [s]."""
 
     def __post_init__(self) -> None:
+        n_uav = len(self.free_s)
+        for name, array in (
+            ("arrives_s", np.full(n_uav, -np.inf)),
+            ("leaving", np.full(n_uav, -1, dtype=np.int32)),
+            ("leaves_s", np.zeros(n_uav)),
+        ):
+            if getattr(self, name).size == 0:
+                object.__setattr__(self, name, array)
         for name, dtype, n_axes in _ARRAYS:
             array = converted(name, getattr(self, name), dtype, n_axes)
             object.__setattr__(self, name, array)

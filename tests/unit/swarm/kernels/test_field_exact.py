@@ -14,7 +14,7 @@ from swarm.kernels.field import fly_lists
 from swarm.kernels.field_exact import FieldLists, ProofOutcome
 from tests.support.field_dilemmas import dilemma
 from tests.support.field_missions import mission_of
-from tests.support.field_oracle.brute import best_plan, can_do_alone
+from tests.support.field_oracle.brute import best_plan
 from tests.support.field_oracle.flight import FlightTimes
 from tests.support.field_oracle.made_up import KINDS, Draft, made_up
 from tests.support.field_oracle.scenario import read
@@ -139,21 +139,6 @@ def test_best_list_of_one_uav_is_that_of_a_team_of_one() -> None:
         assert own.outcome is ProofOutcome.PROVEN
         assert (own.n_left_out + nobody_can, own.items) == (team.n_left_out, team.lists[0])
         assert own.objective == pytest.approx(team.objective, rel=1e-12)
-
-
-def test_who_can_do_what_alone_is_as_the_oracle_says() -> None:
-    for kind, seed in product(("energy", "windows", "due", "lines", "slots"), range(8)):
-        draft = made_up(seed, kind)
-        scenario, problem = read(draft), problem_of(draft)
-        times = FlightTimes(scenario)
-
-        can = field_exact.can_do_alone(problem.kernel, FieldState.at_start(problem))
-
-        expected = [
-            [can_do_alone(scenario, times, uav, task) for task in scenario.known]
-            for uav in scenario.uavs
-        ]
-        assert can.tolist() == expected
 
 
 def test_threads_change_nothing() -> None:
