@@ -59,7 +59,8 @@ class DecisionTurn:
     excluded: Collection[str]
     """Tasks this UAV cannot take, whatever their value."""
     sortie_end_s: float = math.inf
-    """By then it must have landed [s]; infinite: endless, or of no matter as it stands at a base."""
+    """By then it must have landed [s]; infinite: endless, or of no matter while it stands at a
+    base."""
     landed_at: str | None = None
     """Base at which it stands ready, with a full battery; None: it is in the air."""
     parked: bool = False

@@ -5,11 +5,20 @@ Leaves out: what follows for one UAV's decision (agent.core.field_decision).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping, Sequence
 
+import numpy as np
+import numpy.typing as npt
+
 from swarm.allocation.field import FieldProblem, FieldState
-from swarm.protocol.board import TaskBoard
-from swarm.protocol.uav_messages import Claim
+from swarm.allocation.field.ways import task_nodes
+from swarm.kernels.field_alone import earliest_alone
+from swarm.protocol.board import TaskBoard, TaskState, holders, ranks
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
+
+_ON_THE_WAY = (BaseStage.APPROACHING, BaseStage.WAITING)
+_ON_THE_GROUND = (BaseStage.LANDED, BaseStage.PARKED)
 
 
 def field_state(
@@ -17,24 +26,87 @@ def field_state(
     board: TaskBoard,
     claims: Mapping[str, Claim],
     *,
+    present: Collection[str],
     sequence: Sequence[str] = (),
     blocking: Mapping[str, str] | None = None,
 ) -> FieldState:
-    """Where everybody stands, once they have ended what ``claims`` say.
+    """Where everybody stands once they have ended what ``claims`` say.
 
     Args:
         problem: of this board.
         board: the registers; outcomes say where a UAV was last, and what it survived.
         claims: by UAV, those that count: their tasks are not open, and their UAVs are free at
-            their completion. Of others it is read what battery they have and where they stand.
+            their completion. Who approaches a base is free when it says that it will be ready.
+        present: UAVs believed alive. What they say of their batteries, and that they stand at a
+            base, is so whether their claims count or not.
         sequence: UAV ids, best rank first; others follow by id.
         blocking: UAV -> base, lost ones that stand on a slot for good.
 
     Returns:
         A state in which all are active but the ``blocking``; who takes part is the caller's
-        judgement. Who approaches a base is free when it says that it will be ready.
+        judgement. Who has claimed nothing is free since its last attempt, or since 0.
     """
-    raise NotImplementedError
+    state = after_attempts(problem, board)
+    rank = ranks(sequence, problem.uav_ids)
+    columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
+    for row, uav in enumerate(problem.uav_ids):
+        state.rank[row] = rank[uav]
+        if blocking is not None and uav in blocking:
+            state.landed_at[row] = problem.base_ids.index(blocking[uav])
+            state.active[row] = False
+            continue
+        known = board.replica.claims.get(uav)
+        if known is not None and uav in present:
+            _take_battery(problem, state, row, known)
+            if known.stage in _ON_THE_GROUND and known.departs_s is None:
+                _stand(problem, state, row, known)
+        claim = claims.get(uav)
+        if claim is None:
+            continue
+        if claim.task is not None:
+            if claim.task in columns:
+                _end_task(problem, state, row, columns[claim.task], claim)
+        elif claim.stage in _ON_THE_WAY:
+            _stand(problem, state, row, claim)
+            arrives_s = claim.arrives_s
+            state.arrives_s[row] = claim.completion_s if arrives_s is None else arrives_s
+    return state
+
+
+def after_attempts(problem: FieldProblem, board: TaskBoard) -> FieldState:
+    """Where every UAV stands after the attempts it has ended, as if nobody claimed anything.
+
+    ``open`` is as on the board; batteries are as at mission time 0.
+    """
+    state = FieldState.at_start(problem)
+    states = board.states
+    state.open[:] = [states.get(task) is TaskState.OPEN for task in problem.task_ids]
+    rows: dict[str, int] = {uav: index for index, uav in enumerate(problem.uav_ids)}
+    columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
+    ended = sorted(
+        (outcome.completed_s, columns[task], rows[uav], bool(outcome.reversed))
+        for (uav, task), outcome in board.replica.outcomes.items()
+        if uav in rows and task in columns
+    )
+    for completed_s, task, row, backwards in ended:
+        _end_at(problem, state, row, task, completed_s, backwards=backwards)
+    return state
+
+
+def last_node(problem: FieldProblem, board: TaskBoard, uav: str) -> int:
+    """Node where ``uav`` was after its last attempt: the end of that task, else its start."""
+    columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
+    ended = max(
+        (
+            (outcome.completed_s, columns[task], bool(outcome.reversed))
+            for (who, task), outcome in board.replica.outcomes.items()
+            if who == uav and task in columns
+        ),
+        default=None,
+    )
+    if ended is None:
+        return problem.uav_ids.index(uav)
+    return task_nodes(problem, ended[1], backwards=ended[2])[1]
 
 
 def doable_in_field(
@@ -50,4 +122,78 @@ def doable_in_field(
         present: the writers believed alive; the lost take no part.
         mission_s: now [s mission time]: nobody departs before.
     """
-    raise NotImplementedError
+    claims = {
+        uav: claim
+        for uav, claim in board.replica.claims.items()
+        if uav in present and claim.phase is not ClaimPhase.OUT
+    }
+    claimed = holders(claims)
+    counting = {
+        uav: claim
+        for uav, claim in claims.items()
+        if (claim.base is not None if claim.task is None else claimed.get(claim.task) == uav)
+    }
+    state = field_state(problem, board, counting, present=claims)
+    state.active[:] = [uav in claims for uav in problem.uav_ids]
+    np.maximum(state.free_s, mission_s, out=state.free_s)
+    can: npt.NDArray[np.bool_] = np.any(np.isfinite(earliest_alone(problem.kernel, state)), axis=0)
+    states = board.states
+    return [
+        task
+        for column, task in enumerate(problem.task_ids)
+        if states.get(task) is TaskState.OPEN and (can[column] or task in claimed)
+    ]
+
+
+def _take_battery(problem: FieldProblem, state: FieldState, row: int, claim: Claim) -> None:
+    """What a UAV says of the end of its sortie; of its first one it need not say anything."""
+    if claim.sortie_end_s is not None:
+        state.sortie_end_s[row] = claim.sortie_end_s
+    elif claim.task is not None and claim.departs_s is not None:
+        state.sortie_end_s[row] = claim.departs_s + problem.full_s[row]
+    elif claim.base is None and claim.phase is ClaimPhase.IDLE and state.free_s[row] > 0.0:
+        # On the ground away from all bases, unless its battery is endless.
+        state.sortie_end_s[row] = math.inf if np.isinf(problem.full_s[row]) else -math.inf
+
+
+def _stand(problem: FieldProblem, state: FieldState, row: int, claim: Claim) -> None:
+    """Let a UAV stand ready at the base of its claim, at its completion."""
+    base = _base_of(problem, claim)
+    if base is None:
+        return
+    state.landed_at[row] = base
+    state.free_s[row] = claim.completion_s
+    state.arrives_s[row] = math.inf if claim.stage is BaseStage.PARKED else -math.inf
+    state.first_s[row] = problem.leg_s[problem.kind[row], problem.n_uav + base]
+
+
+def _base_of(problem: FieldProblem, claim: Claim) -> int | None:
+    """Index of the base that a claim names; None if there is none, or it is unknown."""
+    return next((i for i, base in enumerate(problem.base_ids) if base == claim.base), None)
+
+
+def _end_task(problem: FieldProblem, state: FieldState, row: int, task: int, claim: Claim) -> None:
+    """Let a UAV end the task it claims: then it is free, there, and nobody else takes it."""
+    state.landed_at[row] = -1
+    state.open[task] = False
+    base = _base_of(problem, claim)
+    if claim.departs_s is not None and claim.stage is BaseStage.LANDED and base is not None:
+        state.leaving[row] = base
+        state.leaves_s[row] = claim.departs_s
+    backwards = bool(claim.reversed)
+    _end_at(problem, state, row, task, claim.completion_s, backwards=backwards)
+
+
+def _end_at(
+    problem: FieldProblem,
+    state: FieldState,
+    row: int,
+    task: int,
+    completed_s: float,
+    *,
+    backwards: bool,
+) -> None:
+    state.free_s[row] = completed_s
+    leaves = task_nodes(problem, task, backwards=backwards)[1]
+    state.first_s[row] = problem.leg_s[problem.kind[row], leaves]
+    state.survived[row] *= problem.survival[row, task]
