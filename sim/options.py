@@ -171,4 +171,4 @@ def print_report(told: MissionReport, *, json: bool, report: Path | None) -> int
         told.render(Console(highlight=False))
     if report is not None:  # last: a full disk must not hide the result
         write_report(told, report)
-    return 0 if told.result.is_complete else 1
+    return 1 if told.missed else 0

@@ -14,6 +14,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from coordinator.mission_view.missed import missed_tasks
 from coordinator.mission_view.presentation import BAD, Signs, signs_for, story_style
 from coordinator.mission_view.results import (
     MissionResult,
@@ -29,7 +30,7 @@ from coordinator.mission_view.results import (
 from coordinator.mission_view.story import MissionEvent, notable
 from coordinator.mission_view.wording import clean, shown_s, shown_value
 from coordinator.planner.plan_report import plan_as_json, schedule_as_json
-from swarm.model import Mission, Plan, UavId
+from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.model.plan import Schedule
 from swarm.runtime.errors import Fault, InputError
 
@@ -80,6 +81,11 @@ class MissionReport:
     def verdict(self) -> str:
         """The whole result in one line."""
         return summary_line(self.mission, self.plan, self.result)
+
+    @property
+    def missed(self) -> tuple[TaskId, ...]:
+        """Tasks that should have been done, and were not."""
+        return missed_tasks(self.mission, self.result)
 
     def as_json(self) -> dict[str, object]:
         """The report as `swarm run --json` prints it, ready for `json.dumps`.
@@ -135,7 +141,7 @@ class MissionReport:
         mission, plan, result = self.mission, self.plan, self.result
         ascii_only = console.options.ascii_only
         signs = signs_for(ascii_only)
-        style = "bold green" if result.is_complete else BAD
+        style = BAD if self.missed else "bold green"
         parts: list[RenderableType] = [
             Text.assemble((f"{mission.name}: ", "bold"), (self.verdict, style))
         ]

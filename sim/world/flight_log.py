@@ -19,6 +19,7 @@ from agent.core.interface import (
     Return,
     Swap,
     Swapped,
+    Telemetry,
     VehicleOrder,
     VehicleReport,
 )
@@ -45,9 +46,36 @@ class _OpenLeg:
     """Number of the vehicle's order."""
     go: str | None = None
     """Where it goes, in a schedule; None as long as that is not known."""
+    base: BaseId | None = None
+    """The same, if it is a base."""
     arrive_s: float | None = None
     begin_s: float | None = None
     is_reversed: bool = False
+
+
+@dataclass(slots=True)
+class BaseStay:
+    """A UAV stands at a base, on one of its slots."""
+
+    uav: str
+    base: BaseId
+    begin_s: float
+    """Its touch-down [s]."""
+    ready_s: float = math.inf
+    """When its battery has been changed [s]."""
+    end_s: float = math.inf
+    """Its lift-off, or when it has made room for others [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class LastSeen:
+    """A UAV at the moment at which it is to take no further part."""
+
+    at_s: float
+    place_enu_m: Point
+    """Where it believes to be [m; height included]."""
+    battery_frac: float | None
+    flies: bool
 
 
 @dataclass(slots=True)
@@ -82,16 +110,30 @@ class FlightLog:
         self._tracks = tracks
         self._tasks = {str(task.id): task for task in mission.tasks}
         self._flown = {str(uav.id): _Flown() for uav in mission.uavs}
+        self.stays: list[BaseStay] = []
+        """At bases, in the order of touch-down."""
+        self.last_seen: dict[str, LastSeen] = {}
+        """UAVs that were sent home for good."""
 
     # -- what happens -------------------------------------------------------------------
 
     def ordered(
-        self, uav: str, order: VehicleOrder, place_enu_m: Point | None, now_s: float
+        self, uav: str, order: VehicleOrder, telemetry: Telemetry | None, now_s: float
     ) -> None:
-        """The vehicle at that place is told to do something [m; None: it is not known where]."""
+        """The vehicle that is there is told to do something; None: it is not known where."""
         flown = self._flown[uav]
-        if place_enu_m is None:
+        if telemetry is None:
             return
+        place_enu_m = telemetry.position_enu_m
+        track = self._tracks.get(uav)
+        flies = track is None or track.airborne
+        if isinstance(order, Return):
+            frac = telemetry.battery_frac
+            self.last_seen.setdefault(uav, LastSeen(now_s, place_enu_m, frac, flies))
+        else:
+            self.last_seen.pop(uav, None)
+        if isinstance(order, GoTo):
+            self.made_room(uav, now_s)
         match order:
             case GoTo():
                 self._go(uav, flown, order, place_enu_m, now_s)
@@ -102,7 +144,7 @@ class FlightLog:
                     here, there = place_enu_m[:2], order.position_enu_m[:2]
                     leg = flown.open = _OpenLeg(None, 1, now_s, here, [there], order.leg)
                 if leg is not None and base is not None:
-                    leg.go, leg.leg = at_base(base), order.leg
+                    leg.go, leg.base, leg.leg = at_base(base), base, order.leg
             case Return():
                 self._return(uav, flown, order, place_enu_m, now_s)
             case _:
@@ -118,13 +160,22 @@ class FlightLog:
             case Landed(number) if leg is not None and number == leg.leg and leg.begin_s is None:
                 leg.begin_s = now_s
                 leg.arrive_s = now_s if leg.arrive_s is None else leg.arrive_s
+                if leg.base is not None:
+                    self.stays.append(BaseStay(uav, leg.base, now_s))
             case Swapped(number) if leg is not None and number == leg.leg:
                 flown.entries.append(_entry(leg, now_s))
                 flown.open = None
+                for stay in self._here(uav):
+                    stay.ready_s = now_s
             case Home() if leg is not None and leg is not flown.home and leg.leg < 0:
                 flown.home = leg
             case _:
                 pass
+
+    def made_room(self, uav: str, now_s: float) -> None:
+        """Its slot is free again: it has taken off, or its agent says that it stands elsewhere."""
+        for stay in self._here(uav):
+            stay.end_s = now_s
 
     def attempt_ended(self, uav: str, task: str, attempt: int, now_s: float, zero_s: float) -> None:
         """An attempt at a task is over, which may be said again."""
@@ -154,6 +205,10 @@ class FlightLog:
                 entries.append(_entry(flown.home, arrive_s))
             schedule[UavId(uav)] = tuple(_since(zero_s or 0.0, entry) for entry in entries)
         return schedule
+
+    def _here(self, uav: str) -> list[BaseStay]:
+        """Its stay that goes on, if there is one."""
+        return [stay for stay in self.stays if stay.uav == uav and stay.end_s == math.inf]
 
     # -- pieces -------------------------------------------------------------------------
 

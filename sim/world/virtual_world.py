@@ -60,7 +60,7 @@ from swarm.model.plan import Schedule
 from swarm.protocol.events import Ask, Finish, LogLine, Publish, PublishLast, Save
 from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoch, Snapshot
 from swarm.protocol.timing import Timing
-from swarm.protocol.uav_messages import Outcome
+from swarm.protocol.uav_messages import BaseStage, Claim, Outcome
 from swarm.runtime.shell import Core
 
 ONLOOKER = "onlooker"
@@ -312,7 +312,9 @@ class World:
                 if isinstance(vehicle, FieldVehicle):
                     vehicle.begin_mission()
             self._schedule_faults(self.zero_s)
-        if isinstance(message.body, Outcome) and message.writer == process.name:
+        if isinstance(message.body, Claim) and message.body.stage is BaseStage.PARKED:
+            self.flight_log.made_room(process.name, self.queue.now_s())
+        elif isinstance(message.body, Outcome) and message.writer == process.name:
             ended, times_s = message.body, (self.queue.now_s(), self.zero_s or 0.0)
             self.flight_log.attempt_ended(process.name, ended.task, ended.attempt, *times_s)
         self.network.publish(process, message)
@@ -328,9 +330,7 @@ class World:
             self.queue.after(0.0, lambda: process.step(refused))
             return
         self._commanders[process.name] = process
-        telemetry = vehicle.telemetry()
-        place_enu_m = None if telemetry is None else telemetry.position_enu_m
-        self.flight_log.ordered(process.name, order, place_enu_m, self.queue.now_s())
+        self.flight_log.ordered(process.name, order, vehicle.telemetry(), self.queue.now_s())
         vehicle.order(order, VehicleReady())
 
     def _vehicle(self, uav: str) -> SimulatedVehicle:
