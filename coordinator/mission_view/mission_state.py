@@ -13,6 +13,7 @@ from collections.abc import Callable, Collection
 from coordinator.mission_view.fleet_reports import FleetReports
 from coordinator.mission_view.flown_mission import FlownMission
 from coordinator.mission_view.narrator import MissionNarrator
+from coordinator.mission_view.observed_flights import ObservedFlights
 from coordinator.mission_view.pace import PacedClock
 from coordinator.mission_view.results import MissionResult
 from coordinator.mission_view.story import EventKind, MissionEvent
@@ -70,6 +71,8 @@ class MissionState:
         self.cut_since_s: float | None = None
         """When the own link to the bus went down [s of ``now_s``]; None while it is up."""
         self._timing = timing
+        self.flights = ObservedFlights()
+        """Where UAVs went, as far as they have told."""
         self._flown = FlownMission(mission, self.board)
         self._reports = FleetReports(self.replica)
         self.statuses = self._reports.statuses
@@ -264,6 +267,7 @@ class MissionState:
             reborn = self._reports.take_status(writer, message.stamp, message.body)
             if reborn is not None:
                 self._narrator.status(writer, message.body, before, now_s, reborn=reborn)
+                self.flights.hear_status(writer, message.body, self._layer_m(writer))
             return
         if isinstance(message.body, Choice):
             if self._reports.take_choice(writer, message.stamp, message.body):
@@ -276,6 +280,7 @@ class MissionState:
         if not self.replica.join(message):
             return
         self._clock.heed(message.body, brief, epoch)
+        self.flights.hear(writer, message.body)
         match message.body:
             case PlanEpoch() as epoch:
                 self._hear_epoch(epoch, now_s)
@@ -291,6 +296,12 @@ class MissionState:
             case _:
                 pass
         self._narrator.hear(message, earlier, claim, now_s)
+
+    def _layer_m(self, uav: str) -> float:
+        """Height of a UAV's layer above where it says that it is [m]."""
+        brief = self.replica.brief
+        uavs = () if brief is None else brief.uavs
+        return next((spec.layer_m for spec in uavs if spec.id == uav), 0.0)
 
     def _is_another_visit(self, outcome: Outcome, earlier: Message) -> bool:
         """Whether it is no mere restatement, by a new life of the agent, of what was known."""

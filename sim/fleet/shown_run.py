@@ -100,6 +100,10 @@ class ShownRun:
             wall_s=flight.wall_s,
             speedup=self._speedup,
             fates=flight.fates,
+            executed_schedule=flight.mission_state.flights.executed_schedule(
+                flight.mission_state.mission
+            ),
+            closest_approach_m=flight.mission_state.flights.closest_approach_m,
             security=security_of(options, self._mission, flight.dropped),
         )
         status = print_report(told, json=outputs.json, report=outputs.report)

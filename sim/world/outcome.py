@@ -91,7 +91,8 @@ def value_of(fate: Realization, visits: Iterable[TaskVisit]) -> float:
             weight = 1.0 if fate.uncertainty.outcomes else mission.success(uav, task)
             if not fate.uncertainty.survival:
                 weight *= survived[visit.uav]
-            value += weight * task.value * (mission.horizon_s - visit.completed_s)
+            until_s = mission.horizon_s if task.due_s is None else task.due_s
+            value += weight * task.value * (until_s - visit.completed_s)
         survived[visit.uav] *= mission.survival(uav, task)
     return value
 

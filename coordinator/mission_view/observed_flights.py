@@ -1,0 +1,201 @@
+"""What an observer knows of where UAVs went: lists by their claims and outcomes, places by status.
+
+What nobody told is told of nobody: a visit is known by its outcome, the way home by the word that
+a UAV takes no further part, and distances by straight lines between the places in its status, so
+what UAVs do beside these lines in between is not seen.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import deque
+from dataclasses import dataclass, field
+
+from swarm.model import BaseId, Mission, Task, UavId
+from swarm.model.plan import START, ScheduleEntry, at_base
+from swarm.protocol.fields import Point
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, Outcome, Status, StatusPhase
+
+_KEPT = 32
+"""Places remembered of each UAV: for as long as another one's may come late."""
+
+_Fix = tuple[float, Point]
+"""Mission time [s] and place [m], its layer included."""
+_MapPoint = tuple[float, float]
+
+
+@dataclass(slots=True)
+class _Flight:
+    """What is known of one UAV."""
+
+    claim: Claim | None = None
+    claims: dict[str, Claim] = field(default_factory=dict)
+    """The newest on each task."""
+    visits: list[tuple[Claim, float, float | None]] = field(default_factory=list)
+    """Claims that came to something, when that ended, and when it landed at a base [s]."""
+    fixes: deque[_Fix] = field(default_factory=lambda: deque(maxlen=_KEPT))
+    """Newest places in flight."""
+    left_s: float | None = None
+    """When it was to take no further part [s]."""
+    home_s: float | None = None
+    """When it was first heard to be home after that [s]."""
+
+
+class ObservedFlights:
+    """The flights of one fleet, in mission time."""
+
+    def __init__(self) -> None:
+        self.closest_approach_m: float | None = None
+        """Least distance seen of two UAVs in flight [m]; None until two were."""
+        self._flights: dict[str, _Flight] = {}
+
+    # -- what is heard ------------------------------------------------------------------
+
+    def hear_status(self, uav: str, status: Status, layer_m: float) -> None:
+        """A UAV tells where it is, ``layer_m`` above that."""
+        flight = self._flights.setdefault(uav, _Flight())
+        if status.mission_s is None or status.position_enu_m is None:
+            return
+        if status.phase is StatusPhase.HOME:
+            if flight.left_s is not None and flight.home_s is None:
+                flight.home_s = status.mission_s
+            return
+        if status.phase in (StatusPhase.LEARNING, StatusPhase.PREPARING, StatusPhase.OUT):
+            return
+        east_m, north_m, up_m = status.position_enu_m
+        if flight.fixes and flight.fixes[-1][0] >= status.mission_s:
+            return
+        flight.fixes.append((status.mission_s, (east_m, north_m, up_m + layer_m)))
+        for other, rival in self._flights.items():
+            if other != uav:
+                self._compare(flight.fixes, rival.fixes)
+
+    def hear(self, writer: str, body: object) -> None:
+        """Somebody says something that was not known."""
+        match body:
+            case Claim():
+                self._hear_claim(writer, body)
+            case Outcome():
+                self._hear_outcome(writer, body)
+            case _:
+                pass
+
+    def _hear_claim(self, uav: str, claim: Claim) -> None:
+        """A UAV says what it is about."""
+        flight = self._flights.setdefault(uav, _Flight())
+        before, flight.claim = flight.claim, claim
+        if claim.task is not None:
+            flight.claims[claim.task] = claim
+        if claim.phase is ClaimPhase.OUT and flight.left_s is None:
+            flight.left_s = claim.decided_s
+        elif claim.phase is not ClaimPhase.OUT:
+            flight.left_s = flight.home_s = None
+        if claim.stage is BaseStage.LANDED and claim.task is None and claim.arrives_s is not None:
+            landed = before is not None and before.stage is BaseStage.LANDED
+            if not (landed and before is not None and before.base == claim.base):
+                flight.visits.append((claim, claim.completion_s, None))
+            flight.visits[-1] = (claim, claim.completion_s, claim.arrives_s)
+
+    def _hear_outcome(self, uav: str, outcome: Outcome) -> None:
+        """An attempt is over; the claim on what comes next may have been heard before."""
+        flight = self._flights.setdefault(uav, _Flight())
+        known = {(claim.task, end_s) for claim, end_s, _ in flight.visits}
+        claim = flight.claims.get(outcome.task)
+        if claim is None:
+            return
+        if (outcome.task, outcome.completed_s) not in known:
+            flight.visits.append((claim, outcome.completed_s, None))
+
+    # -- what follows -------------------------------------------------------------------
+
+    def executed_schedule(self, mission: Mission) -> dict[UavId, tuple[ScheduleEntry, ...]]:
+        """Every UAV's list, as far as it is known."""
+        tasks = {str(task.id): task for task in mission.tasks}
+        bases = {str(base.id): base.position_enu_m for base in mission.bases}
+        schedule = {}
+        for uav in mission.uavs:
+            flight = self._flights.get(str(uav.id), _Flight())
+            here: _MapPoint = uav.position_enu_m[:2]
+            entries: list[ScheduleEntry] = []
+            for claim, end_s, landed_s in flight.visits:
+                if claim.task is not None and claim.task in tasks:
+                    entry, here = _visit(tasks[claim.task], claim, here, end_s)
+                elif claim.base is not None and claim.base in bases:
+                    there: _MapPoint = bases[claim.base][:2]
+                    begin_s = end_s if landed_s is None else landed_s
+                    times_s = claim.decided_s, begin_s, begin_s, end_s
+                    go = at_base(BaseId(claim.base))
+                    entry, here = ScheduleEntry(go, here, (there,), *times_s), there
+                else:
+                    continue
+                entries.append(entry)
+            if entries and flight.left_s is not None and flight.home_s is not None:
+                home: _MapPoint = uav.position_enu_m[:2]
+                times_s = flight.left_s, flight.home_s, flight.home_s, flight.home_s
+                entries.append(ScheduleEntry(START, here, (home,), *times_s))
+            schedule[uav.id] = tuple(entries)
+        return schedule
+
+    def _compare(self, fixes: deque[_Fix], others: deque[_Fix]) -> None:
+        """Look how near the newest piece of a way comes to another's."""
+        if len(fixes) < 2:
+            return
+        (begin_s, begin), (end_s, end) = fixes[-2], fixes[-1]
+        for index in range(len(others) - 1, 0, -1):
+            (from_s, start), (to_s, stop) = others[index - 1], others[index]
+            first_s, last_s = max(begin_s, from_s), min(end_s, to_s)
+            if to_s < begin_s:
+                break
+            if first_s > last_s:
+                continue
+            apart = [
+                tuple(
+                    a - b
+                    for a, b in zip(
+                        _at((begin_s, begin), (end_s, end), at_s),
+                        _at((from_s, start), (to_s, stop), at_s),
+                        strict=True,
+                    )
+                )
+                for at_s in (first_s, last_s)
+            ]
+            distance_m = _least_m(apart[0], apart[1])
+            if self.closest_approach_m is None or distance_m < self.closest_approach_m:
+                self.closest_approach_m = distance_m
+
+
+def _visit(
+    task: Task, claim: Claim, here: _MapPoint, end_s: float
+) -> tuple[ScheduleEntry, _MapPoint]:
+    """One visit, begun as late as its service lets it; and where it ends."""
+    points = task.path_enu_m or (task.position_enu_m,)
+    ends = points[:: -1 if claim.reversed else 1]
+    begin_s = end_s - task.service_s
+    entry = ScheduleEntry(
+        go=task.id,
+        from_enu_m=here,
+        via_enu_m=(ends[0][:2],),
+        depart_s=min(claim.decided_s, begin_s),
+        arrive_s=begin_s,
+        begin_s=begin_s,
+        end_s=end_s,
+        is_reversed=bool(claim.reversed),
+    )
+    return entry, ends[-1][:2]
+
+
+def _at(begin: _Fix, end: _Fix, at_s: float) -> Point:
+    (begin_s, start), (end_s, stop) = begin, end
+    share = 0.0 if end_s <= begin_s else (at_s - begin_s) / (end_s - begin_s)
+    east_m, north_m, up_m = (a + share * (b - a) for a, b in zip(start, stop, strict=True))
+    return east_m, north_m, up_m
+
+
+def _least_m(first: tuple[float, ...], last: tuple[float, ...]) -> float:
+    """Least length of an offset that changes evenly from the first to the last [m]."""
+    change = [b - a for a, b in zip(first, last, strict=True)]
+    square = sum(c * c for c in change)
+    share = 0.0
+    if square > 0.0:
+        share = min(1.0, max(0.0, -sum(a * c for a, c in zip(first, change, strict=True)) / square))
+    return math.hypot(*(a + share * c for a, c in zip(first, change, strict=True)))

@@ -1,0 +1,89 @@
+"""Where UAVs went, from what they say of it."""
+
+from __future__ import annotations
+
+import pytest
+
+from coordinator.mission_view.observed_flights import ObservedFlights
+from sim.world.simulation import simulate_mission
+from sim.world.uncertainty import Uncertainty
+from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId
+from swarm.protocol.uav_messages import (
+    AttemptResult,
+    BaseStage,
+    Claim,
+    ClaimPhase,
+    Outcome,
+    Status,
+    StatusPhase,
+)
+
+UAVS = tuple(Uav(UavId(f"u{n}"), (0.0, 10.0 * n, 0.0), 10.0) for n in range(2))
+LINE = ((20.0, 0.0, 0.0), (40.0, 0.0, 0.0), (40.0, 30.0, 0.0))
+TASKS = (
+    Task(TaskId("t0"), (50.0, 0.0, 0.0), 1.0, service_s=2.0),
+    Task(TaskId("line"), LINE[0], 1.0, path_enu_m=LINE),
+)
+MISSION = Mission("m", 300.0, UAVS, TASKS, bases=(Base(BaseId("b0"), (5.0, 5.0, 0.0), 10.0),))
+
+
+def status(phase: StatusPhase, mission_s: float, east_m: float, north_m: float = 0.0) -> Status:
+    return Status(phase, None, (east_m, north_m, 0.0), None, None, mission_s, {}, "")
+
+
+def test_a_plain_flight_is_told_as_its_vehicles_flew_it() -> None:
+    mission = Mission("m", 300.0, UAVS, (TASKS[0], Task(TaskId("t1"), (0.0, 60.0, 0.0), 2.0)))
+    world = simulate_mission(mission, method="greedy", seed=0, uncertainty=Uncertainty()).world
+    told = world.mission_state.flights.executed_schedule(world.mission)
+    flown = world.executed_schedule()
+
+    for uav, entries in flown.items():
+        work = [entry for entry in entries if entry.go != "start"]
+        assert [entry.go for entry in told[uav] if entry.go != "start"] == [e.go for e in work]
+        for one, other in zip(told[uav], work, strict=False):
+            assert (one.depart_s, one.begin_s) == pytest.approx((other.depart_s, other.begin_s))
+            assert one.end_s == pytest.approx(other.end_s)
+            assert (one.from_enu_m, one.via_enu_m) == (other.from_enu_m, other.via_enu_m)
+
+
+def test_swaps_lines_and_the_way_home_are_told() -> None:
+    flights = ObservedFlights()
+    approach = Claim(
+        ClaimPhase.HELD, None, 0.0, 0, 20.0, base="b0", stage=BaseStage.APPROACHING, arrives_s=9.0
+    )
+    landed = Claim(
+        ClaimPhase.HELD, None, 0.0, 0, 19.5, base="b0", stage=BaseStage.LANDED, arrives_s=9.5
+    )
+    line = Claim(ClaimPhase.HELD, "line", 19.5, 0, 40.0, reversed=True)
+    out = Claim(ClaimPhase.OUT, None, 41.0, 0, 41.0)
+    for claim in (approach, landed, landed, line, out):
+        flights.hear("u0", claim)
+        if claim is out:
+            flights.hear("u0", Outcome("line", AttemptResult.DONE, 1, 40.0))
+    flights.hear_status("u0", status(StatusPhase.HOME, 50.0, 0.0), 10.0)
+    entries = flights.executed_schedule(MISSION)[UavId("u0")]
+
+    assert [entry.go for entry in entries] == ["base:b0", "line", "start"]
+    assert (entries[0].begin_s, entries[0].end_s) == (9.5, 19.5)
+    assert (entries[1].is_reversed, entries[1].via_enu_m) == (True, ((40.0, 30.0),))
+    assert entries[2].from_enu_m == (20.0, 0.0)
+    assert (entries[2].depart_s, entries[2].arrive_s) == (41.0, 50.0)
+
+
+def test_the_closest_approach_is_between_the_lines_that_were_told() -> None:
+    flights = ObservedFlights()
+    for at_s, place_m in ((0.0, 0.0), (10.0, 100.0)):
+        flights.hear_status("u0", status(StatusPhase.FLYING, at_s, place_m), 10.0)
+    for at_s, place_m in ((1.0, 90.0), (9.0, 10.0)):
+        flights.hear_status("u1", status(StatusPhase.FLYING, at_s, place_m, 4.0), 13.0)
+    assert flights.closest_approach_m == pytest.approx(5.0)
+
+    flights.hear_status("u1", status(StatusPhase.HOME, 10.0, 100.0), 10.0)
+    assert flights.closest_approach_m == pytest.approx(5.0)
+
+
+def test_of_a_fleet_that_said_nothing_nothing_is_told() -> None:
+    flights = ObservedFlights()
+
+    assert flights.executed_schedule(MISSION) == {UavId("u0"): (), UavId("u1"): ()}
+    assert flights.closest_approach_m is None
