@@ -37,14 +37,22 @@ def child_pids(parent: int) -> dict[str, int]:
     """
     found = {}
     for pid in _children(parent):
-        try:
-            line = (Path("/proc") / str(pid) / "cmdline").read_bytes().decode()
-        except OSError:
-            continue
-        words = line.rstrip("\0").split("\0")
-        if FORK_SERVER not in words:
-            found[" ".join(words[words.index("swarm") + 1 :] if "swarm" in words else words)] = pid
+        words = _words(pid)
+        if words is not None:
+            found[words] = pid
     return found
+
+
+def _words(pid: int) -> str | None:
+    """The words after ``swarm`` on a command line; None of what has ended or forks the others."""
+    try:
+        line = (Path("/proc") / str(pid) / "cmdline").read_bytes().decode()
+    except OSError:
+        return None
+    words = line.rstrip("\0").split("\0")
+    if FORK_SERVER in words:
+        return None
+    return " ".join(words[words.index("swarm") + 1 :] if "swarm" in words else words)
 
 
 def alive(pid: int) -> bool:
@@ -59,10 +67,11 @@ def alive(pid: int) -> bool:
 def _children(parent: int) -> list[int]:
     """Of all threads of a process, zombies included."""
     found = []
+    tasks = f"/proc/{parent}/task"
     with contextlib.suppress(OSError):
-        for thread in (Path("/proc") / str(parent) / "task").iterdir():
-            with contextlib.suppress(OSError):
-                found += [int(pid) for pid in (thread / "children").read_text().split()]
+        for thread in os.listdir(tasks):  # noqa: PTH208 - looked at all the time
+            with contextlib.suppress(OSError), open(f"{tasks}/{thread}/children", "rb") as file:  # noqa: PTH123
+                found += [int(pid) for pid in file.read().split()]
     return found
 
 
@@ -84,7 +93,7 @@ class SwarmRun:
         )
         self.lines: list[str] = []
         """Standard error so far."""
-        self.seen: dict[str, int] = {}
+        self.seen: set[int] = set()
         """Every child ever seen."""
         self._out: list[str] = []
         self._readers = [
@@ -115,15 +124,21 @@ class SwarmRun:
         for stream in (self.process.stdout, self.process.stderr):
             if stream is not None:
                 stream.close()
-        for pid in self.seen.values():
+        for pid in self.seen:
             if alive(pid):  # only after a failed test
                 os.kill(pid, signal.SIGKILL)
 
     def children(self) -> dict[str, int]:
         """Living children by command line."""
         found = child_pids(self.process.pid)
-        self.seen.update(found)
+        self.seen.update(found.values())
         return found
+
+    def _see_children(self) -> None:
+        """Remember who runs, ten times a second or more: asks only those not seen yet."""
+        for pid in _children(self.process.pid):
+            if pid not in self.seen and _words(pid) is not None:
+                self.seen.add(pid)
 
     def child(self, role: str, uav: str = "") -> int:
         """Pid of the one living child of that role, and of that UAV."""
@@ -139,7 +154,7 @@ class SwarmRun:
         """Wait until ``text`` has come ``count`` times on standard error."""
 
         def there() -> bool:
-            self.children()
+            self._see_children()
             assert self.process.poll() is None or self._count(text) >= count, self.story()
             return self._count(text) >= count
 
@@ -156,7 +171,7 @@ class SwarmRun:
         """Exit status and JSON, once it has ended by itself."""
         deadline_s = time.monotonic() + timeout_s
         while self.process.poll() is None:
-            self.children()
+            self._see_children()
             assert time.monotonic() < deadline_s, self.story()
             time.sleep(0.1)
         for reader in self._readers:
@@ -172,7 +187,5 @@ class SwarmRun:
     def assert_nothing_left(self, timeout_s: float = 10.0, *, but: str = "") -> None:
         """No process that was ever seen lives on, and no file is left ``but`` of that pattern."""
         assert self.seen
-        wait_until(
-            lambda: not any(alive(pid) for pid in self.seen.values()), timeout_s, "the end of all"
-        )
+        wait_until(lambda: not any(alive(pid) for pid in self.seen), timeout_s, "the end of all")
         assert [entry for entry in self.folder.iterdir() if not fnmatch(entry.name, but)] == []
