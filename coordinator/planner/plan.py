@@ -270,12 +270,13 @@ class _PlanRequest:
         if method == "exact" and proven is not None:
             return proven.routes, None, 0
         if method in ("exact", GuidedRule.name):
-            stop = None if self.stop is None else ends
+            stop, progress = None if self.stop is None else ends, self.progress
             if method == "exact":
                 stop = after_evaluations(_INSTEAD_OF_PROOF)
-            guided = guided_plan(
-                problem, seed=seed, stop=stop, progress=self.progress, threads=threads
-            )
+            elif proven is not None and isinstance(stop, Limit):
+                reached = _Reached(evaluate(problem, proven.routes)[0], progress)
+                stop, progress = first_of(stop, reached.stops), reached.note
+            guided = guided_plan(problem, seed=seed, stop=stop, progress=progress, threads=threads)
             sequence = guided.sequence if method == GuidedRule.name else None
             return guided.routes, sequence, guided.iterations
         stopped = isinstance(self.stop, Limit)
@@ -289,6 +290,26 @@ class _PlanRequest:
             threads=threads,
         )
         return search.routes, search.sequence, search.evaluations
+
+
+@dataclass(slots=True)
+class _Reached:
+    """Ends a search that has found what is proven to be the best: it cannot find more."""
+
+    objective: float
+    tell: Progress | None
+    reached: bool = False
+
+    def note(self, iterations: int, worth: float) -> None:
+        """Look at the best J so far, and pass it on."""
+        self.reached = worth >= self.objective
+        if self.tell is not None:
+            self.tell(iterations, worth)
+
+    def stops(self, iterations: float) -> bool:
+        """Whether it is found."""
+        del iterations
+        return self.reached
 
 
 def _by_id(problem: Problem, routes: Sequence[Sequence[int]]) -> dict[UavId, tuple[TaskId, ...]]:

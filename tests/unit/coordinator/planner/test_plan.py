@@ -79,6 +79,22 @@ def test_pop_ups_are_in_no_list(method: str) -> None:
     assert sum(len(route) for route in plan.routes.values()) == 7
 
 
+def test_a_search_with_a_limit_ends_once_it_has_what_is_proven_to_be_the_best() -> None:
+    spent: list[float] = []
+
+    plan = make_plan(
+        table_1_mission(),
+        "guided",
+        clock=TickingClock(),
+        seed=1,
+        stop=after_evaluations(1_000_000),
+        progress=lambda iterations, _: spent.append(iterations),
+    )
+
+    assert plan.gap == 0.0
+    assert plan.evaluations == spent[-1] < 1_000_000
+
+
 def test_optimum_of_a_large_mission_is_left_open() -> None:
     plan = make_plan(wide_mission(4, 20), "greedy", clock=TickingClock())
 
