@@ -10,8 +10,6 @@ import math
 import re
 from dataclasses import replace
 
-import pytest
-
 from agent.core.interface import (
     HandedOver,
     HandOverExplained,
@@ -24,11 +22,7 @@ from agent.vehicle.config import CommandStyle
 from sim.autopilot.firmware import FirmwareModelName
 from sim.world.bridged_vehicle import Equipment
 from swarm.protocol.uav_messages import StatusPhase
-from tests.support.bridged_fleet import FIELD, KINDS, BridgedFleet, fenced
-
-pytestmark = pytest.mark.parametrize(
-    ("flavour", "style"), KINDS, ids=[f"{flavour}-{style}" for flavour, style in KINDS]
-)
+from tests.support.bridged_fleet import FIELD, ONE_DIAGONAL, OTHER_DIAGONAL, BridgedFleet, fenced
 
 LONG_S = 150.0
 """By then a vehicle that comes home by itself is there."""
@@ -63,6 +57,7 @@ def assert_sent_home(fleet: BridgedFleet, uav: str, reason: str) -> None:
     assert not fleet.vehicles[uav].pilot().armed
 
 
+@ONE_DIAGONAL
 def test_a_pilot_and_a_reboot_take_vehicles_away(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -75,6 +70,7 @@ def test_a_pilot_and_a_reboot_take_vehicles_away(
     assert not fleet.vehicles["u2"].pilot(LONG_S).armed, "nobody starts its motors again"
 
 
+@OTHER_DIAGONAL
 def test_low_batteries_go_home_and_failsafes_are_left_to_themselves(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -108,6 +104,7 @@ def assert_home_after_silence(fleet: BridgedFleet, uav: str) -> None:
     assert not fleet.vehicles[uav].pilot(LONG_S).armed
 
 
+@ONE_DIAGONAL
 def test_who_is_silent_comes_home_once_it_is_heard_and_who_is_blind_is_left_alone(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -120,6 +117,7 @@ def test_who_is_silent_comes_home_once_it_is_heard_and_who_is_blind_is_left_alon
     assert_let_go(fleet, "u2", "no valid position for 5 s")
 
 
+@OTHER_DIAGONAL
 def test_a_fix_that_comes_late_delays_the_takeoff_and_nothing_else(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -133,6 +131,7 @@ def test_a_fix_that_comes_late_delays_the_takeoff_and_nothing_else(
         assert fleet.books[uav].first_s(VehicleReady) > 15.0
 
 
+@ONE_DIAGONAL
 def test_who_cannot_arm_stays_and_who_does_not_move_gives_its_tasks_away(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -150,6 +149,7 @@ def test_who_cannot_arm_stays_and_who_does_not_move_gives_its_tasks_away(
     assert fleet.phase("u2") is StatusPhase.HOME
 
 
+@OTHER_DIAGONAL
 def test_another_vehicle_than_the_configured_one_is_never_commanded(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -167,6 +167,7 @@ def test_another_vehicle_than_the_configured_one_is_never_commanded(
     assert_home_after_silence(fleet, "u2")
 
 
+@ONE_DIAGONAL
 def test_a_fence_keeps_targets_from_one_uav_and_brings_a_strayed_one_home(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:

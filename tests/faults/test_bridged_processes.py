@@ -14,12 +14,8 @@ from sim.autopilot.firmware import FirmwareModelName
 from sim.world.settings import RestartMemory
 from swarm.protocol.messages import CommandKind
 from swarm.protocol.uav_messages import StatusPhase
-from tests.support.bridged_fleet import KINDS, LIMIT_S, BridgedFleet, Logbook
+from tests.support.bridged_fleet import LIMIT_S, ONE_DIAGONAL, OTHER_DIAGONAL, BridgedFleet, Logbook
 from tests.support.fake_copter import ARM, TAKEOFF
-
-pytestmark = pytest.mark.parametrize(
-    ("flavour", "style"), KINDS, ids=[f"{flavour}-{style}" for flavour, style in KINDS]
-)
 
 HOLD, RESUME, RETURN, ABORT = CommandKind
 IN_FLIGHT_S = 15.0
@@ -34,6 +30,7 @@ def commands(book: Logbook, *, life: int) -> set[int]:
 
 
 @pytest.mark.parametrize("found", [RestartMemory.DISK, RestartMemory.NONE])
+@ONE_DIAGONAL
 def test_an_agent_that_starts_anew_takes_its_vehicle_on_in_the_air(
     flavour: FirmwareModelName, style: CommandStyle, found: RestartMemory
 ) -> None:
@@ -52,6 +49,7 @@ def test_an_agent_that_starts_anew_takes_its_vehicle_on_in_the_air(
     assert not fleet.vehicles["u0"].pilot().armed
 
 
+@OTHER_DIAGONAL
 def test_a_vehicle_that_fell_while_its_agent_was_down_is_not_started_again(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -67,6 +65,7 @@ def test_a_vehicle_that_fell_while_its_agent_was_down_is_not_started_again(
     assert fleet.done_by("u0") == ()
 
 
+@ONE_DIAGONAL
 def test_a_vehicle_whose_agent_stays_away_comes_home_if_a_mission_stands_on_it(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -84,6 +83,7 @@ def test_a_vehicle_whose_agent_stays_away_comes_home_if_a_mission_stands_on_it(
     assert pilot.armed is not comes_home
 
 
+@OTHER_DIAGONAL
 def test_a_vehicle_that_is_held_stays_where_it_is_until_it_may_go_on(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -112,6 +112,7 @@ def test_a_vehicle_that_is_held_stays_where_it_is_until_it_may_go_on(
     assert fleet.done_by("u0") != ()
 
 
+@ONE_DIAGONAL
 def test_a_vehicle_that_is_sent_home_takes_no_further_task(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -130,6 +131,7 @@ def test_a_vehicle_that_is_sent_home_takes_no_further_task(
     assert not fleet.vehicles["u0"].pilot().armed
 
 
+@OTHER_DIAGONAL
 def test_an_abort_brings_every_vehicle_home(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:

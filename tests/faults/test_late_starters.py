@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import replace
 from functools import partial
 
-import pytest
-
 from agent.core.interface import VehicleReady
 from agent.vehicle.config import CommandStyle
 from coordinator.operator.commands import StartRequest
@@ -15,11 +13,8 @@ from sim.autopilot.firmware import FirmwareModelName
 from sim.world.settings import RestartMemory
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import StatusPhase
-from tests.support.bridged_fleet import FIELD, KINDS, BridgedFleet
+from tests.support.bridged_fleet import FIELD, ONE_DIAGONAL, OTHER_DIAGONAL, BridgedFleet
 
-pytestmark = pytest.mark.parametrize(
-    ("flavour", "style"), KINDS, ids=[f"{flavour}-{style}" for flavour, style in KINDS]
-)
 HOVER_S, RESTART_S = 20.0, 4.0
 TIMING = Timing(status_s=1.0, hover_s=HOVER_S, restart_s=RESTART_S)
 SLOW = replace(FIELD, tasks=tuple(replace(task, service_s=12.0) for task in FIELD.tasks))
@@ -33,6 +28,7 @@ def hovered_s(fleet: BridgedFleet) -> float:
     return fleet.world.zero_s - ready_s
 
 
+@ONE_DIAGONAL
 def test_one_whose_agent_died_is_not_waited_for_and_joins_when_it_is_back(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -48,6 +44,7 @@ def test_one_whose_agent_died_is_not_waited_for_and_joins_when_it_is_back(
     assert set(fleet.world.finished.values()) == {0}
 
 
+@OTHER_DIAGONAL
 def test_on_the_operators_word_the_others_start_at_once(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -68,6 +65,7 @@ def test_on_the_operators_word_the_others_start_at_once(
     fleet.assert_all_done()
 
 
+@ONE_DIAGONAL
 def test_one_that_gets_ready_too_late_joins_the_mission_that_runs(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import (
@@ -47,6 +48,25 @@ from tests.support.fake_px4 import FakePx4
 from tests.support.fleet_builders import plan_for
 
 KINDS = [(flavour, style) for flavour in FirmwareModelName for style in CommandStyle]
+_ALIKE = [
+    (FirmwareModelName.ARDUPILOT, CommandStyle.REPOSITION),
+    (FirmwareModelName.PX4, CommandStyle.MISSION),
+]
+
+
+def _by_day(day: Collection[tuple[FirmwareModelName, CommandStyle]]) -> pytest.MarkDecorator:
+    night = pytest.mark.slow
+    cases = [
+        pytest.param(*kind, marks=[] if kind in day else [night], id=f"{kind[0]}-{kind[1]}")
+        for kind in KINDS
+    ]
+    return pytest.mark.parametrize(("flavour", "style"), cases)
+
+
+ONE_DIAGONAL = _by_day(_ALIKE)
+"""Every firmware and every style by day, all that they make together at night."""
+OTHER_DIAGONAL = _by_day([kind for kind in KINDS if kind not in _ALIKE])
+"""The same with the other two by day: for every second test, so that each day flies all four."""
 LIMIT_S = 400.0
 _WITH_REASON = HandedOver | HandOverExplained | Refused | ReturnAdvised
 FIELD = Mission(
