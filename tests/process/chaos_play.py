@@ -77,7 +77,10 @@ def play(
         link=link,
     )
 
-    async def fly() -> ChaosVerdict:
+    # Not as the result of the task: asyncio.run puts that into words, megabytes of them.
+    verdicts: list[ChaosVerdict] = []
+
+    async def fly() -> None:
         async with asyncio.timeout(LIMIT_S):
             async with open_chaos_flight(mission, options, relayed=relayed) as flight:
                 try:
@@ -87,9 +90,10 @@ def play(
                     logged = [f"{name}: {line}" for name, line in flight.lines[-40:]]
                     fault.add_note("\n".join([*told(flight), *logged]))
                     raise
-            return flight.verdict()
+            verdicts.append(flight.verdict())
 
-    return asyncio.run(fly())
+    asyncio.run(fly())
+    return verdicts[0]
 
 
 def story(verdict: ChaosVerdict) -> list[str]:
