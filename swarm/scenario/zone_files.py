@@ -136,13 +136,13 @@ def _of_geojson(document: Mapping[str, object], source: str, name: str) -> ZoneD
 def _ring(ring: object, source: str, place: str) -> tuple[FlatPoint, ...]:
     """A ring of GeoJSON, which has longitudes first."""
     corners: list[FlatPoint] = []
-    for corner in ring if isinstance(ring, list) else [None]:
+    for number, corner in enumerate(ring if isinstance(ring, list) else [None], 1):
         numbers = [number_of(each) for each in corner] if isinstance(corner, list) else []
         match numbers:
             case [float(lon_deg), float(lat_deg), *_]:
                 corners.append((lat_deg, lon_deg))
             case _:
-                problem = f"{shown(corner)} is no corner"
+                problem = f"corner {number} is no place"
                 remedy = "give rings of [longitude, latitude]"
                 where = f"{place}.geometry.coordinates" if place else "coordinates"
                 raise InputError(Fault(source, where, problem, remedy))

@@ -7,8 +7,12 @@ from dataclasses import replace
 import pytest
 
 from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.protocol.field_messages import UavReady, ZoneEdit, ZoneSpec
 from tests.support.builders import brief, order
 from tests.support.observed_mission import Teller, random_mission
+
+CORNERS = ((50.0, 50.0), (60.0, 50.0), (60.0, 60.0))
+VILLAGE = ZoneSpec("village", CORNERS, (), None, None, False)
 
 
 def ordered_mission() -> Teller:
@@ -60,3 +64,50 @@ def test_tasks_added_to_another_flight_are_forgotten_with_it() -> None:
     teller.say(COORDINATOR, replace(brief(*teller.mission_state.mission.uavs), run=2), 4.0)
 
     assert [task.id for task in teller.mission_state.mission.tasks] == ["t0", "t1"]
+
+
+# -- in the field -------------------------------------------------------------------------
+
+
+def test_the_story_tells_zones_and_words_of_readiness() -> None:
+    teller = ordered_mission()
+    teller.say(OPERATOR, ZoneEdit(VILLAGE, False, 1, "crowd"), 3.0)
+    teller.say(OPERATOR, ZoneEdit(replace(VILLAGE, id="arena", inclusive=True), False, 1, ""), 4.0)
+    teller.say(OPERATOR, UavReady("uav0", 1, "battery 7"), 5.0)
+    teller.say(OPERATOR, ZoneEdit(VILLAGE, True, 1, ""), 6.0)
+    teller.say(OPERATOR, ZoneEdit(VILLAGE, False, 9, "another flight's"), 7.0)
+
+    told = [line.text for line in teller.mission_state.story if line.text.startswith("operator")]
+    assert told == [
+        "operator draws zone village: crowd",
+        "operator keeps the fleet inside zone arena",
+        "operator lets uav0 start again: battery 7",
+        "operator takes zone village away",
+    ]
+
+
+def test_zones_of_the_mission_are_those_in_force() -> None:
+    teller = ordered_mission()
+    teller.say(OPERATOR, ZoneEdit(VILLAGE, False, 1, ""), 3.0)
+    assert teller.mission_state.mission.zones == (VILLAGE.zone(),)
+
+    teller.say(OPERATOR, ZoneEdit(VILLAGE, True, 1, ""), 4.0)
+    assert teller.mission_state.mission.zones == ()
+
+
+def test_a_line_with_limits_is_told_and_worth_what_is_left_until_it_is_due() -> None:
+    teller = ordered_mission()
+    path = ((1.0, 0.0, 0.0), (9.0, 0.0, 0.0))
+    limits = {"path_enu_m": path, "due_s": 60.0, "opens_s": 5.0, "closes_s": 50.0, "height_m": 30.0}
+    teller.say(OPERATOR, order("op1", 1.0, value=2.0, **limits), 3.0)
+    (line,) = (each for each in teller.mission_state.story if each.text.startswith("operator"))
+    assert line.detail.endswith(
+        "a line of 2 points from 1 m east of the origin, opens at 5.00 s, closes at 50.0 s, "
+        "due by 60.0 s, 30 m high"
+    )
+
+    teller.end("uav0", "op1", 10.0)
+    result = teller.mission_state.result()
+    assert result.executed_objective == pytest.approx(2.0 * (60.0 - 10.0))
+    added = next(task for task in teller.mission_state.mission.tasks if task.id == "op1")
+    assert (added.path_enu_m, added.due_s, added.appears_s) == (path, 60.0, 3.0)

@@ -8,32 +8,21 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.mission_view.mission_state import MissionState
 from coordinator.operator.commands import CommandRequest, RequestResult
-from coordinator.operator.requests import RequestTracker, TrackedRequest
 from coordinator.operator.task_edits import NewTask, TaskWithdrawal, Wgs84
-from swarm.model import Mission
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.events import (
     Ask,
-    CommonAction,
-    CommonEvent,
     MessageReceived,
-    PeerSeen,
-    Publish,
-    SnapshotsReceived,
     Tick,
 )
 from swarm.protocol.messages import (
-    Body,
     CommandKind,
     Message,
     MissionPhase,
-    Snapshot,
     Stamp,
     TaskEdit,
 )
-from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import StatusPhase
 from tests.support.builders import (
     IDLE,
@@ -41,7 +30,6 @@ from tests.support.builders import (
     OUT,
     brief,
     done,
-    entry,
     epoch,
     held,
     message,
@@ -49,67 +37,10 @@ from tests.support.builders import (
     order,
     status,
     task,
-    uav,
 )
+from tests.support.order_desk import FLEET, PATIENCE_S, TIMING, Desk, came
 
-PATIENCE_S = 10.0
-TIMING = Timing(silence_s=100.0)
-FLEET = [uav("u0", lift=0.0), uav("u1", lift=0.0)]
 HERE = NewTask((3.0, 4.0, 0.0))
-
-
-class Desk:
-    """An operator's requests beside ``u0`` and ``u1``, whom the test plays."""
-
-    def __init__(self, flown: Mission | None = None) -> None:
-        self.mission_state = MissionState(flown or mission(FLEET, []), TIMING)
-        self.errands = RequestTracker(
-            self.mission_state, incarnation=50, timing=TIMING, patience_s=PATIENCE_S
-        )
-        self.now_s = 0.0
-        self.wishes: list[CommonAction] = []
-        self._counter = 0
-        self.hear(COORDINATOR, brief(*FLEET))
-        self.hear(COORDINATOR, entry("t0", value=2.0), entry("t1", number=4, value=6.0))
-        self.hear(COORDINATOR, epoch("u0", "u1"))
-        for writer in ("u0", "u1"):
-            self.happen(PeerSeen(writer))
-            self.hear(writer, IDLE)
-        self.wishes.clear()
-
-    def hear(self, writer: str, *bodies: Body) -> None:
-        for body in bodies:
-            self._counter += 1
-            self.happen(MessageReceived(message(writer, body, self._counter)))
-
-    def give(self, wish: NewTask | TaskWithdrawal | CommandRequest) -> TrackedRequest:
-        tracked_request = self.errands.give(wish, self.now_s)
-        self.happen(Tick())
-        return tracked_request
-
-    def confirm(self, tracked_request: TrackedRequest, *writers: str) -> None:
-        assert tracked_request.said is not None
-        answers = [Snapshot(MISSION, w, 1, None, (tracked_request.said,)) for w in writers]
-        self.happen(SnapshotsReceived(tuple(answers)))
-
-    def happen(self, fact: CommonEvent, at_s: float | None = None) -> None:
-        self.now_s = self.now_s if at_s is None else at_s
-        self.mission_state.step(fact, self.now_s)
-        self.wishes += self.errands.step(fact, self.now_s)
-
-    def wait(self, until_s: float) -> None:
-        while (due_s := self.errands.next_deadline_s()) is not None and due_s <= until_s:
-            assert due_s >= self.now_s
-            self.happen(Tick(), due_s)
-
-    @property
-    def said(self) -> list[Message]:
-        return [wish.message for wish in self.wishes if isinstance(wish, Publish)]
-
-
-def came(tracked_request: TrackedRequest) -> tuple[RequestResult, str]:
-    assert tracked_request.verdict is not None
-    return tracked_request.verdict.result, tracked_request.verdict.text
 
 
 # -- adding -------------------------------------------------------------------------------
