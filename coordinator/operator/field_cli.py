@@ -22,7 +22,7 @@ _ADD_HELP = """Draw a zone where nobody may fly from now on.
 The fleet leaves it by the shortest way and flies round it; tasks and bases in it are out of reach.
 Corners go round either way, in metres east and north of the mission's origin, in degrees, or as a
 file has them: a table [[zone]] of a scenario (.toml), or a Polygon in GeoJSON. Works without a
-coordinator. Exit status 1: nobody was seen to know of it.
+coordinator. Exit status 1: somebody who is there was not seen to know of it, and the line says who.
 
 \b
 Examples:
@@ -32,7 +32,7 @@ Examples:
 """
 _REMOVE_HELP = """Take a zone away: one that was drawn in flight, or one of the scenario.
 
-Works without a coordinator. Exit status 1: nobody was seen to know of it.
+Works without a coordinator. Exit status 1: somebody was not seen to know of it.
 
 \b
 Examples:

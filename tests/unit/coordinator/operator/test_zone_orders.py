@@ -58,8 +58,8 @@ def test_who_has_not_confirmed_a_zone_in_time_is_named() -> None:
     desk.confirm(tracked, "u0")
     desk.wait(PATIENCE_S)
     assert came(tracked) == (
-        RequestResult.OBEYED,
-        "zone z is drawn; u1 has not confirmed it yet",
+        RequestResult.NOT_OBEYED,
+        "zone z is drawn; u1 has not confirmed it",
     )
 
     unheard = desk.give(NewZone("y", SQUARE))
