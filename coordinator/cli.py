@@ -309,7 +309,7 @@ def coordinator(
         swarm coordinator valley-survey --dashboard 8080
     """
     from coordinator.core.active import CoordinatorCore
-    from coordinator.core.publication import height_warning
+    from coordinator.core.publication import height_warning, unsayable
     from coordinator.daemon import CoordinatorProcess
     from coordinator.dashboard.access import parse_serve_address
     from coordinator.dashboard.supervisor import supervised_dashboard
@@ -335,6 +335,9 @@ def coordinator(
 
     identify(mission=mission.name)
     layers = FlightLayers(lowest_layer_m, layer_spacing_m)
+    remedy = "leave some out, or make several of it"
+    if faults := [Fault(str(scenario), "", what, remedy) for what in unsayable(mission, layers)]:
+        raise InputError(*faults)
     if (warning := height_warning(mission, layers)) is not None:
         get_logger(COORDINATOR).warning(warning)
 

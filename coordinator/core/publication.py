@@ -8,18 +8,20 @@ more.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import replace
 
-from coordinator.planner.field_schedule import left_out
+from coordinator.mission_view.missed import able_alone
 from swarm.model import Mission, Origin, Task, Uav
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.model.ids import COORDINATOR
 from swarm.model.layers import FlightLayers
-from swarm.model.plan import LeftOut
-from swarm.protocol.board import TaskBoard, TaskState
+from swarm.protocol.board import TaskBoard, TaskState, is_of_field
+from swarm.protocol.encoding import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES, encode
 from swarm.protocol.events import LogLine, Publish
 from swarm.protocol.field_messages import BaseSpec, ZoneSpec
+from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.messages import (
     Body,
     Message,
@@ -27,6 +29,7 @@ from swarm.protocol.messages import (
     MissionPhase,
     PlanEpoch,
     Snapshot,
+    Stamp,
     TaskEntry,
     UavSpec,
 )
@@ -94,6 +97,37 @@ def height_warning(mission: Mission, layers: FlightLayers) -> str | None:
     )
 
 
+def unsayable(mission: Mission, layers: FlightLayers) -> list[str]:
+    """What of ``mission`` no message has room for, a line each; nobody would ever know it."""
+    found = []
+    size = _longest(mission.name, mission_config_of(mission, layers, MAX_COUNT))
+    if size > LARGE_LIMIT_BYTES:
+        found.append(
+            f"fleet, bases and zones take {size} bytes, and a message has room for "
+            f"{LARGE_LIMIT_BYTES}"
+        )
+    for number, task in enumerate(mission.tasks):
+        beyond = 0
+        if task.path_enu_m:  # nothing else of a task is long
+            beyond = _longest(mission.name, task_entry_of(task, number)) - SMALL_LIMIT_BYTES
+        if beyond > 0:
+            points = len(task.path_enu_m)
+            most = points - math.ceil(beyond / _POINT_BYTES)
+            found.append(
+                f"the line of task {task.id} has {points} points, and a message has room for {most}"
+            )
+    return found
+
+
+_POINT_BYTES = 28
+"""Of a point in a message: three numbers of nine bytes, and that they are three."""
+
+
+def _longest(mission: str, body: Body) -> int:
+    """Bytes of a message that says ``body``, whatever its stamp."""
+    return len(encode(Message(mission, COORDINATOR, Stamp(MAX_COUNT, MAX_COUNT), body)))
+
+
 def last_epoch(epoch: PlanEpoch, mission_s: float, reason: str) -> PlanEpoch:
     """The epoch by which the mission ends, after ``epoch``."""
     number, phase = epoch.number + 1, MissionPhase.ENDED
@@ -138,20 +172,15 @@ def scenario_differences(mission: Mission, layers: FlightLayers, replica: Replic
 def exit_status(board: TaskBoard, mission: Mission) -> int:
     """0 if every task of ``mission`` has appeared and was done or withdrawn, else 1.
 
-    In the field a task may be left that has a time by which it is due, or that nobody could have
-    done even as its only one.
+    In the field and in schema 2 a task may be left that has a time by which it is due, or that
+    nobody could have done even as its only one.
     """
     closed = {t for t, s in board.states.items() if s in (TaskState.DONE, TaskState.WITHDRAWN)}
-    to_come, problem = unreleased_tasks(board.replica, mission), board.field_problem
-    if problem is None:
+    to_come, flown = unreleased_tasks(board.replica, mission), board.mission
+    if flown is None or (mission.schema == 1 and not is_of_field(flown)):
         return 0 if closed.issuperset(board.states) and not to_come else 1
-    if any(task.due_s is None for task in to_come):
-        return 1
-    ids = problem.task_ids
-    found = left_out(problem, [column for column, task in enumerate(ids) if task in closed])
-    required = {task for task, due in zip(ids, problem.required, strict=True) if due}
-    could = {task for task, why in found.items() if why is not LeftOut.NOBODY_CAN}
-    return 0 if required.isdisjoint(could) else 1
+    left = [*(task for task in flown.tasks if task.id not in closed), *to_come]
+    return 1 if able_alone(flown, [task for task in left if task.due_s is None]) else 0
 
 
 def unreleased_tasks(replica: Replica, mission: Mission) -> list[Task]:

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from coordinator.mission_view.results import MissionResult
-from swarm.allocation.field import FieldProblem
+from swarm.allocation.field import FieldProblem, FieldState
 from swarm.kernels.field_alone import earliest_alone
 from swarm.model import Mission, Task, TaskId
 from swarm.model.mission import PLAIN_CONSTRAINTS
@@ -39,5 +39,5 @@ def able_alone(mission: Mission, tasks: Iterable[Task]) -> Collection[TaskId]:
     if PLAIN_CONSTRAINTS.issuperset(mission.constraints):  # tables of legs may be large
         return {task.id for task in known if any(mission.success(u, task) for u in mission.uavs)}
     problem = FieldProblem.from_mission(mission, tasks=known)
-    can = np.isfinite(earliest_alone(problem.kernel, problem.first_s))
+    can = np.isfinite(earliest_alone(problem.kernel, FieldState.at_start(problem)))
     return {known[column].id for column in np.flatnonzero(can.any(axis=0)).tolist()}

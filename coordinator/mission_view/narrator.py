@@ -17,6 +17,7 @@ from coordinator.mission_view.wording import (
     entry_in_words,
     listed,
     order_in_words,
+    visit_in_words,
     zone_in_words,
 )
 from swarm.model import Mission
@@ -172,6 +173,8 @@ class MissionNarrator:
         running = self._phase is MissionPhase.RUNNING
         if claim.phase is ClaimPhase.OUT and running and self._board.unfinished:
             self.tell(EventKind.OUT, f"{uav} takes no further part", now_s, uavs=[uav])
+        if (visit := visit_in_words(claim, before)) is not None:
+            self.tell(EventKind.BASE, f"{uav} {visit}", now_s, uavs=[uav])
         if reasons is not None:
             reasons.release(uav, claim, before, now_s)
         if task is None or (before is not None and before.task == task):

@@ -33,6 +33,8 @@ class EventKind(StrEnum):
     OUT = "out"
     RETURNING = "returning"
     HOME = "home"
+    BASE = "base"
+    """A UAV goes to have its battery changed, or is at it."""
     FREE = "free"
     PAUSED = "paused"
     POSTED = "posted"

@@ -12,7 +12,7 @@ from swarm.protocol.board import claim_strength
 from swarm.protocol.field_messages import ZoneEdit
 from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEdit, TaskEntry
 from swarm.protocol.operator_commands import describe_command
-from swarm.protocol.uav_messages import Choice, Claim, ClaimPhase
+from swarm.protocol.uav_messages import BaseStage, Choice, Claim, ClaimPhase
 
 _PUNCTUAL_S = 0.005
 """Smaller differences are none."""
@@ -99,6 +99,23 @@ def zone_in_words(edit: ZoneEdit) -> str:
         return f"operator takes zone {edit.zone.id} away{because(edit.reason)}"
     keeps = "keeps the fleet inside" if edit.zone.inclusive else "draws"
     return f"operator {keeps} zone {edit.zone.id}{because(edit.reason)}"
+
+
+_VISITED = {
+    BaseStage.APPROACHING: "flies to base {} for another battery",
+    BaseStage.WAITING: "waits above base {} for a free slot",
+    BaseStage.LANDED: "has landed at base {}",
+    BaseStage.PARKED: "is parked at base {}",
+}
+
+
+def visit_in_words(claim: Claim, before: Claim | None) -> str | None:
+    """What a UAV does at a base since ``before``; None if that has not changed."""
+    if claim.base is None or claim.stage is None:
+        return None
+    if before is not None and (before.base, before.stage) == (claim.base, claim.stage):
+        return None
+    return _VISITED[claim.stage].format(claim.base)
 
 
 def seconds_in_words(time_s: float) -> str:

@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import pytest
 
+from coordinator.mission_view.story import EventKind
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.field_messages import UavReady, ZoneEdit, ZoneSpec
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
 from tests.support.builders import brief, order
 from tests.support.observed_mission import Teller, random_mission
 
@@ -89,19 +91,19 @@ def test_the_story_tells_zones_and_words_of_readiness() -> None:
 def test_zones_of_the_mission_are_those_in_force() -> None:
     teller = ordered_mission()
     teller.say(OPERATOR, ZoneEdit(VILLAGE, False, 1, ""), 3.0)
-    assert teller.mission_state.mission.zones == (VILLAGE.zone(),)
+    assert [zone.id for zone in teller.mission_state.mission.zones] == ["village"]
 
     teller.say(OPERATOR, ZoneEdit(VILLAGE, True, 1, ""), 4.0)
-    assert teller.mission_state.mission.zones == ()
+    assert len(teller.mission_state.mission.zones) == 0
 
 
 def test_a_line_with_limits_is_told_and_worth_what_is_left_until_it_is_due() -> None:
     teller = ordered_mission()
     path = ((1.0, 0.0, 0.0), (9.0, 0.0, 0.0))
-    limits = {"path_enu_m": path, "due_s": 60.0, "opens_s": 5.0, "closes_s": 50.0, "height_m": 30.0}
-    teller.say(OPERATOR, order("op1", 1.0, value=2.0, **limits), 3.0)
-    (line,) = (each for each in teller.mission_state.story if each.text.startswith("operator"))
-    assert line.detail.endswith(
+    line = order("op1", 1.0, value=2.0, path_enu_m=path, height_m=30.0)
+    teller.say(OPERATOR, replace(line, due_s=60.0, opens_s=5.0, closes_s=50.0), 3.0)
+    (told,) = (each for each in teller.mission_state.story if each.text.startswith("operator"))
+    assert told.detail.endswith(
         "a line of 2 points from 1 m east of the origin, opens at 5.00 s, closes at 50.0 s, "
         "due by 60.0 s, 30 m high"
     )
@@ -111,3 +113,23 @@ def test_a_line_with_limits_is_told_and_worth_what_is_left_until_it_is_due() -> 
     assert result.executed_objective == pytest.approx(2.0 * (60.0 - 10.0))
     added = next(task for task in teller.mission_state.mission.tasks if task.id == "op1")
     assert (added.path_enu_m, added.due_s, added.appears_s) == (path, 60.0, 3.0)
+
+
+def test_the_story_tells_each_stage_of_a_visit_to_a_base_once() -> None:
+    teller = ordered_mission()
+    visit = Claim(
+        ClaimPhase.HELD, None, 1.0, 0, 90.0, base="b0", stage=BaseStage.APPROACHING, arrives_s=20.0
+    )
+    for at_s, stage in enumerate([*BaseStage, BaseStage.PARKED], 3):
+        teller.say("uav0", replace(visit, stage=stage, arrives_s=float(at_s)), float(at_s))
+    teller.say("uav0", replace(visit, task="t0", stage=BaseStage.LANDED, departs_s=30.0), 9.0)
+    teller.say("uav0", replace(visit, task="t0", base=None, stage=None, arrives_s=None), 30.0)
+
+    told = [line.text for line in teller.mission_state.story if line.kind is EventKind.BASE]
+    assert told == [
+        "uav0 flies to base b0 for another battery",
+        "uav0 waits above base b0 for a free slot",
+        "uav0 has landed at base b0",
+        "uav0 is parked at base b0",
+        "uav0 has landed at base b0",
+    ]

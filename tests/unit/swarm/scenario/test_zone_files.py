@@ -53,7 +53,7 @@ def test_metres_of_a_file_with_an_origin_lie_where_that_says(tmp_path: Path) -> 
 
     assert drawn.in_degrees
     east_m, north_m, _ = enu_from_wgs84(HERE, *drawn.polygon[2], HERE.alt_m)
-    assert (east_m, north_m) == (pytest.approx(90.0), pytest.approx(90.0))
+    assert [east_m, north_m] == pytest.approx([90.0, 90.0])
 
 
 def test_degrees_need_no_origin(tmp_path: Path) -> None:
@@ -127,7 +127,7 @@ def test_of_several_zones_the_one_of_that_name_is_meant(tmp_path: Path) -> None:
         (
             json.dumps({"type": "Polygon", "coordinates": [[[8.0, 47.0], ["x", 1]]]}),
             ".json",
-            'coordinates: corner 2 is no place; give rings of [longitude, latitude]',
+            "coordinates: corner 2 is no place; give rings of [longitude, latitude]",
         ),
         ("", ".kml", ".kml is no kind of file with a zone; give one ending in .toml, .geojson"),
     ],
