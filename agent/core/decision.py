@@ -286,4 +286,8 @@ class ChoiceReporter(AgentPart):
                 if stamp is not None
             },
             digest=combined(numbers),
+            sortie_end_s=turn.sortie_end_s if math.isfinite(turn.sortie_end_s) else None,
+            landed_at=turn.landed_at,
+            parked=turn.parked,
+            blocking=tuple(sorted(turn.blocking.items())),
         )

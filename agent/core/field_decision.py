@@ -18,13 +18,14 @@ from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.rules import FIELD_RULES, GUIDED, item_lists
 from swarm.kernels.field import FieldRuleCode, fly_lists, run_rule
 from swarm.kernels.field_search import SearchedLists, optimise_lists
+from swarm.model import BaseId, TaskId
 from swarm.protocol.board import TaskBoard, claim_strength, ranks
 from swarm.protocol.field_board import field_state, last_node
 from swarm.protocol.uav_messages import Claim, ClaimPhase
 
 _SEED = 0
 """Of the search of every decision: the same state gives the same lists everywhere."""
-_ITERATIONS_PER_TASK, _FEWEST_ITERATIONS, _MOST_ITERATIONS = 20, 100, 400
+_ITERATIONS_PER_TASK, _FEWEST_ITERATIONS, _MOST_ITERATIONS = 20, 50, 250
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,9 +34,9 @@ class FieldTurnDecision:
 
     item: int
     """2k for column k from its first point on, 2k + 1 from its last one on, -1 - b for base b."""
-    task: str | None
+    task: TaskId | None
     """The task it takes; None: it flies to a base."""
-    base: str | None
+    base: BaseId | None
     """The base it flies to; None: it takes a task."""
     reversed: bool
     """Whether a line is flown from its last point to its first."""
@@ -258,7 +259,7 @@ def _stand_here(
     state.landed_at[row] = -1
     state.leaving[row] = -1
     if turn.landed_at is not None:
-        base = [*problem.base_ids].index(turn.landed_at)  # type: ignore[arg-type]
+        base = problem.base_ids.index(BaseId(turn.landed_at))
         state.landed_at[row] = base
         state.arrives_s[row] = math.inf if turn.parked else -math.inf
         state.first_s[row] = problem.leg_s[problem.kind[row], problem.n_uav + base]

@@ -8,14 +8,18 @@ bit.
 
 from __future__ import annotations
 
+import math
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
 from agent.core.decision import DecisionTurn, decide, decide_diversion
+from agent.core.field_decision import decide_in_field, divert_in_field, field_rule_of
+from swarm.allocation.field import FieldProblem
 from swarm.allocation.lower_level import Rule
 from swarm.allocation.rules import GuidedRule
+from swarm.model.plan import at_base
 from swarm.protocol.board import TaskBoard, rule_of
 from swarm.protocol.events import CommonEvent, MessageReceived, SnapshotsReceived
 from swarm.protocol.messages import Message, PlanEpoch, Stamp
@@ -31,7 +35,7 @@ class DecisionDifference:
     uav: str
     choice: Choice
     task: str | None
-    """What the UAV takes now; None: nothing."""
+    """What the UAV takes now, a base as schedules name it; None: nothing."""
     completion_s: float | None
     score: float | None
 
@@ -159,7 +163,13 @@ class _Memory:
             awaited=set(basis.awaited),
             patience_s=basis.patience_s,
             excluded=set(basis.excluded),
+            sortie_end_s=math.inf if basis.sortie_end_s is None else basis.sortie_end_s,
+            landed_at=basis.landed_at,
+            parked=basis.parked,
+            blocking=dict(basis.blocking),
         )
+        if self._board.field_problem is not None:
+            return self._decided_in_field(self._board.field_problem, choice, turn)
         claim = self._replica.claims.get(uav)
         if choice.left is None:
             decision = decide(problem, self._board, rule, turn)
@@ -168,6 +178,25 @@ class _Memory:
         if decision is None:
             return None, None, None
         return problem.task_ids[decision.task], decision.completion_s, decision.score
+
+    def _decided_in_field(
+        self, problem: FieldProblem, choice: Choice, turn: DecisionTurn
+    ) -> tuple[str | None, float | None, float | None]:
+        epoch = self._replica.epoch
+        rule = None if epoch is None else field_rule_of(epoch.rule, epoch.routes)
+        claim = self._replica.claims.get(turn.uav)
+        if rule is None:
+            return None, None, None
+        if choice.left is None:
+            decision = decide_in_field(problem, self._board, rule, turn)
+        elif claim is not None and claim.task == choice.left:
+            decision = divert_in_field(problem, self._board, rule, turn)
+        else:
+            decision = None
+        if decision is None:
+            return None, None, None
+        went = decision.task if decision.base is None else at_base(decision.base)
+        return went, decision.end_s, 0.0 if decision.score is None else decision.score
 
     def _rule_in_force(self) -> Rule | None:
         epoch = self._replica.epoch

@@ -68,6 +68,7 @@ SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
     TaskEdit: _OF_TASKS,
     Claim: frozenset(_OF_CLAIMS),
     Outcome: frozenset({"reversed"}),
+    ChoiceBasis: frozenset({"sortie_end_s", "landed_at", "parked", "blocking"}),
 }
 """Fields that came with `FIELD_VERSION`; left out where they are as by default, so that a statement
 that has none of them is to the last byte what every release understands."""

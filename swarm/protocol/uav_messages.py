@@ -63,6 +63,14 @@ class ChoiceBasis(Checked):
     """Writer -> incarnation and counter of its newest statement that was known."""
     digest: Count
     """Of all statements that were known; equal wherever they are. See swarm.protocol.sync."""
+    sortie_end_s: Instant | None = None
+    """Mission time by which the UAV had to land [s]; None: endless, or of no matter at a base."""
+    landed_at: Id | None = None
+    """Base at which it stood ready."""
+    parked: Flag = False
+    """Whether it stood there beside the slots."""
+    blocking: tuple[tuple[Id, Id], ...] = ()
+    """Lost UAVs, each with the base on whose slot it stood."""
 
 
 @dataclass(frozen=True, slots=True)

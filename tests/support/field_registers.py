@@ -17,7 +17,7 @@ from swarm.model.ids import COORDINATOR
 from swarm.model.layers import FlightLayers
 from swarm.protocol.board import TaskBoard
 from swarm.protocol.field_messages import BaseSpec, ZoneSpec
-from swarm.protocol.messages import Body, MissionConfig, TaskEntry, UavSpec
+from swarm.protocol.messages import Body, Message, MissionConfig, TaskEntry, UavSpec
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, BaseStage, Claim, ClaimPhase, Outcome
 from tests.support.builders import MISSION, epoch, message
@@ -33,6 +33,8 @@ class Moment:
     board: TaskBoard
     decision: int | None
     """Which one of the run it takes then; None: it goes home."""
+    said: tuple[Message, ...]
+    """All that the board knows."""
 
 
 class PlannedRun:
@@ -43,11 +45,18 @@ class PlannedRun:
         problem: of that mission.
         rule: by which all decide.
         sequence: UAVs by priority.
+        said_rule: what the epoch says, if it is to be another one.
     """
 
     def __init__(
-        self, mission: Mission, problem: FieldProblem, rule: FieldRuleCode, sequence: list[int]
+        self,
+        mission: Mission,
+        problem: FieldProblem,
+        rule: FieldRuleCode,
+        sequence: list[int],
+        said_rule: str = "greedy",
     ) -> None:
+        self._said_rule = said_rule
         self._mission = mission
         self._problem = problem
         self._sequence = tuple(str(problem.uav_ids[uav]) for uav in sequence)
@@ -88,7 +97,7 @@ class PlannedRun:
         replica = Replica()
         said: list[tuple[str, Body]] = [(COORDINATOR, brief_of(self._mission))]
         said += [(COORDINATOR, body) for body in entries_of(self._mission)]
-        said.append((COORDINATOR, epoch(*self._sequence)))
+        said.append((COORDINATOR, epoch(*self._sequence, rule=self._said_rule)))
         awaited = set()
         for other in range(problem.n_uav):
             name = str(problem.uav_ids[other])
@@ -105,10 +114,14 @@ class PlannedRun:
                     awaited.add(name)  # in this very moment it is about to find nothing
                     claim = self._freed(past, other)
             said.append((name, claim))
-        for counter, (writer, body) in enumerate(said, 1):
-            replica.join(message(writer, body, counter))
+        messages = tuple(
+            message(writer, body, counter) for counter, (writer, body) in enumerate(said, 1)
+        )
+        for each in messages:
+            replica.join(each)
         past = [k for k in self._of[uav] if k in made]
-        return Moment(self._turn(uav, past, now_s, awaited), TaskBoard(replica, MISSION), decision)
+        turn = self._turn(uav, past, now_s, awaited)
+        return Moment(turn, TaskBoard(replica, MISSION), decision, messages)
 
     def _turn(self, uav: int, past: list[int], now_s: float, awaited: set[str]) -> DecisionTurn:
         problem = self._problem

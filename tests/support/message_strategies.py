@@ -228,6 +228,10 @@ choices = st.builds(
         excluded=st.lists(task_ids, unique=True).map(tuple),
         heads=st.dictionaries(uav_ids, st.tuples(counts, counts)),
         digest=counts,
+        sortie_end_s=st.none() | numbers,
+        landed_at=st.none() | ids,
+        parked=st.booleans(),
+        blocking=st.lists(st.tuples(uav_ids, ids)).map(tuple),
     ),
 )
 commands = st.one_of(
