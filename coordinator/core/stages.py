@@ -29,7 +29,7 @@ from coordinator.core.lifecycle import (
 )
 from coordinator.core.publication import RegisterAnnouncer, exit_status, last_epoch
 from coordinator.mission_view.wording import listed
-from coordinator.planner.online import EpochPolicy, Situation, complete_lists, objective_to_go
+from coordinator.planner.online import EpochPolicy, Situation, complete_lists, worth_to_go
 from swarm.model import Mission
 from swarm.protocol.board import TaskBoard
 from swarm.protocol.events import Finish, LogLine
@@ -383,18 +383,20 @@ class ReplanPolicy:
         if wanted is None or replanned.request != wanted.request:
             return None
         new, old = plan.prediction, plan.going_on
-        new_worth, old_worth = (
-            objective_to_go(situation, new.lists),
-            objective_to_go(situation, old.lists),
-        )
-        gain = new_worth - old_worth
-        adopted = gain > self._margin_frac * abs(old_worth) and not situation.is_settled
+        new_left, new_worth = worth_to_go(situation, new.lists)
+        old_left, old_worth = worth_to_go(situation, old.lists)
+        better = new_worth - old_worth > self._margin_frac * abs(old_worth)
+        if new_left != old_left:
+            better = new_left < old_left
+        adopted = better and not situation.is_settled
         self._under_way, self._answered = None, wanted.situation
         self._expected_s = new.completion_s if adopted else old.completion_s
         if not adopted:
             return None
         self._quiet_until_s = now_s + self._interval_s
         why = f": worth {new_worth:.4g} instead of {old_worth:.4g} value·s"
+        if new_left != old_left:
+            why = f": leaves out {new_left} tasks instead of {old_left}"
         return PlanEpoch(
             number=epoch.number + 1,
             phase=epoch.phase,

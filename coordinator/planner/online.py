@@ -11,9 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from coordinator.planner.field_online import FieldCourse, FieldStanding, going_on, planned_anew
+from coordinator.planner.field_online import worth_to_go as field_worth
 from coordinator.planner.options import ShouldStop, after_evaluations, first_of, never, part_of
 from coordinator.planner.plan import guided_plan
 from coordinator.planner.sequence_search import search_sequence
+from swarm.allocation.field.rules import item_lists
 from swarm.allocation.lower_level import TeamState, run
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
@@ -59,6 +62,9 @@ class Situation:
     withdrawn: frozenset[str]
     failures: int
     """Attempts that failed so far."""
+    field: FieldStanding | None = None
+    """The same under the field's constraints; None where there are none. ``state`` knows nothing
+    of these: it tells who is where, and what is open."""
 
     @classmethod
     def of(cls, board: TaskBoard, credible: Collection[str], mission_s: float) -> Situation | None:
@@ -87,6 +93,8 @@ class Situation:
         ]
         # Who is late may be there any moment, and who waits may decide at once.
         np.maximum(state.free_s, mission_s, out=state.free_s)
+        in_field = board.field_problem
+        taking_part = [uav for uav, part in zip(problem.uav_ids, state.active, strict=True) if part]
         return cls(
             problem,
             state,
@@ -95,6 +103,9 @@ class Situation:
             under_way,
             frozenset(task for task, what in states.items() if what is TaskState.WITHDRAWN),
             sum(outcome.result is AttemptResult.FAILED for outcome in replica.outcomes.values()),
+            None
+            if in_field is None
+            else FieldStanding.of(in_field, board, claims, under_way, taking_part, mission_s),
         )
 
     @property
@@ -106,6 +117,8 @@ class Situation:
     @property
     def is_settled(self) -> bool:
         """Nothing is left that a plan could decide."""
+        if self.field is not None:
+            return self.field.is_settled
         capable = self.problem.capable[self.state.active][:, self.state.open]
         return not bool(capable.any())
 
@@ -134,6 +147,8 @@ class Prediction:
     """Predicted completion of the tasks on the lists and of those under way [s mission time]."""
     objective: float
     """Σ of eq. 1 over the lists [value·s]."""
+    n_left_out: int = 0
+    """Of the open tasks without due_s, those that no list holds; told in the field alone."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -155,6 +170,9 @@ def predicted(situation: Situation, course: EpochPolicy, stop: ShouldStop = neve
     without lists it is decided greedily.
     """
     problem = situation.problem
+    if situation.field is not None:
+        on = going_on(situation.field, course.rule, course.sequence, course.routes)
+        return _in_field(situation, on)
     rule = rule_of(course.rule, course.routes)
     lists: list[list[int]] = [[] for _ in problem.uav_ids]
     if rule is not None:
@@ -164,12 +182,7 @@ def predicted(situation: Situation, course: EpochPolicy, stop: ShouldStop = neve
         if course.rule == GuidedRule.name and stop(0.0):
             lists = _ended_by_lists(situation, course.routes, lists)
     objective, times_s = evaluate(problem, lists, situation.state)
-    free_s = situation.state.free_s
-    completion_s = {
-        situation.under_way[uav]: float(free_s[index])
-        for index, uav in enumerate(problem.uav_ids)
-        if uav in situation.under_way
-    }
+    completion_s = _under_way_s(situation)
     completion_s |= {
         str(problem.task_ids[task]): float(times_s[task]) for route in lists for task in route
     }
@@ -195,8 +208,12 @@ def replan(
         ValueError: there is no such rule.
     """
     problem, state = situation.problem, situation.state
-    going_on = predicted(situation, course, part_of(stop, _GOING_ON_FRAC))
+    expected = predicted(situation, course, part_of(stop, _GOING_ON_FRAC))
     search_stop = part_of(stop, _SEARCH_FRAC)
+    if situation.field is not None:
+        return _replanned_in_field(
+            situation, course, method, expected, seed=seed, stop=search_stop, threads=threads
+        )
     routes: Lists = {}
     n_open = int(np.count_nonzero(state.open))
     if method == GuidedRule.name:
@@ -205,7 +222,7 @@ def replan(
             seed=seed,
             stop=first_of(search_stop, after_evaluations(_ITERATIONS_PER_TASK * max(1, n_open))),
             state=state,
-            lists=_by_index(problem, going_on.lists),
+            lists=_by_index(problem, expected.lists),
             threads=threads,
         )
         order = plan.sequence
@@ -221,7 +238,43 @@ def replan(
         ).sequence
     sequence = tuple(str(problem.uav_ids[uav]) for uav in order if state.active[uav])
     prediction = predicted(situation, EpochPolicy(method, sequence, routes), stop)
-    return ReplanResult(method, sequence, prediction, going_on)
+    return ReplanResult(method, sequence, prediction, expected)
+
+
+def _replanned_in_field(
+    situation: Situation,
+    course: EpochPolicy,
+    method: str,
+    expected: Prediction,
+    *,
+    seed: int,
+    stop: ShouldStop,
+    threads: int | None,
+) -> ReplanResult:
+    """Better lists under the field's constraints; rules by themselves go on as they do."""
+    standing = situation.field
+    sequence = tuple(uav for uav in course.sequence if uav in situation.taking_part)
+    sequence = (*sequence, *sorted(situation.taking_part.difference(sequence)))
+    if standing is None or method != GuidedRule.name:
+        return ReplanResult(method, sequence, expected, expected)
+    begin = item_lists(standing.problem, expected.lists)
+    found = planned_anew(standing, begin, seed=seed, stop=stop, threads=threads)
+    return ReplanResult(method, sequence, _in_field(situation, found), expected)
+
+
+def _in_field(situation: Situation, course: FieldCourse) -> Prediction:
+    completion_s = _under_way_s(situation) | course.completion_s
+    return Prediction(course.routes, completion_s, course.objective, course.n_left_out)
+
+
+def _under_way_s(situation: Situation) -> dict[str, float]:
+    """When the tasks that are under way will be done [s mission time]."""
+    free_s = situation.state.free_s
+    return {
+        situation.under_way[uav]: float(free_s[index])
+        for index, uav in enumerate(situation.problem.uav_ids)
+        if uav in situation.under_way
+    }
 
 
 def complete_lists(situation: Situation, new: Lists) -> Lists:
@@ -254,19 +307,21 @@ def complete_lists(situation: Situation, new: Lists) -> Lists:
     return {uav: tuple(tasks) for uav, tasks in lists.items()}
 
 
-def objective_to_go(situation: Situation, lists: Lists) -> float:
-    """J of what is open if UAVs keep to ``lists`` from here on [value·s].
+def worth_to_go(situation: Situation, lists: Lists) -> tuple[int, float]:
+    """Required tasks left out, and J of what is open, if UAVs keep to ``lists`` from here on.
 
     Closed tasks are skipped; tasks of no UAV taking part are put where J gains most. Far cheaper
-    than `predicted`.
+    than `predicted`. Without the field's constraints none is left out; J is in value·s.
     """
     state = situation.state
     if situation.is_settled:
-        return 0.0
+        return 0, 0.0
+    if situation.field is not None:
+        return field_worth(situation.field, lists)
     next_s = np.where(state.active, state.free_s, np.inf)
     team = team_arrays(situation.problem, state, state.active, situation.now_s)
     indices = _by_index(situation.problem, lists)
-    return guided_choice(team, indices, int(next_s.argmin())).worth
+    return 0, guided_choice(team, indices, int(next_s.argmin())).worth
 
 
 def _ended_by_lists(

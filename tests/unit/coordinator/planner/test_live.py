@@ -12,9 +12,9 @@ from coordinator.planner.online import (
     EpochPolicy,
     Prediction,
     Situation,
-    objective_to_go,
     predicted,
     replan,
+    worth_to_go,
 )
 from coordinator.planner.options import ShouldStop, after_evaluations, never
 from swarm.allocation.objective import evaluate
@@ -329,7 +329,7 @@ def test_good_lists_are_worth_what_was_predicted_of_them(seed: int) -> None:
 
     plan = replan(situation, GREEDY, "guided", stop=after_evaluations(500))
 
-    value = objective_to_go(situation, plan.prediction.lists)
+    _, value = worth_to_go(situation, plan.prediction.lists)
     assert value == pytest.approx(plan.prediction.objective, rel=1e-6, abs=1e-6)
 
 
@@ -339,8 +339,8 @@ def test_worth_skips_what_is_done_and_finds_a_place_for_what_is_on_no_list() -> 
     running.say("a", Claim(ClaimPhase.HELD, "t0", 0.0, 0, 10.0)).lose("b")
 
     # a ends t0 at 10 s, t1 at 30 s, and takes t2 at 80 s though it was on another's list.
-    assert objective_to_go(running.at(1.0), lists) == pytest.approx(470.0 + 420.0)
-    assert objective_to_go(running.say("a", OUT).at(1.0), lists) == 0.0
+    assert worth_to_go(running.at(1.0), lists)[1] == pytest.approx(470.0 + 420.0)
+    assert worth_to_go(running.say("a", OUT).at(1.0), lists) == (0, 0.0)
 
 
 def best_of_all_lists(situation: Situation) -> float:
