@@ -7,6 +7,7 @@ from collections.abc import Awaitable, Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from sim.fleet.faults.flight import DONE_LINE, ChaosFlight, ChaosVerdict, open_chaos_flight
 from sim.fleet.layout import BusKind, LaunchOptions
@@ -45,6 +46,12 @@ def survey(n_uav: int, n_task: int, *, side_m: float = 300.0, service_s: float =
         ),
         origin=Origin(46.8, 9.7, 1100.0),
     )
+
+
+def by_day(bus: BusKind) -> list[object]:
+    """Both kinds of bus, of which only that one is flown by day."""
+    (other,) = {BusKind.ROUTER, BusKind.MESH} - {bus}
+    return [bus, pytest.param(other, marks=pytest.mark.slow)]
 
 
 def play(

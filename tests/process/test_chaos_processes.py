@@ -16,7 +16,7 @@ from sim.fleet.layout import BusKind
 from swarm.model import Task, TaskId
 from swarm.protocol.messages import Body
 from swarm.protocol.uav_messages import Claim, Status
-from tests.process.chaos_play import all_done, logged_done, play, story, survey, told
+from tests.process.chaos_play import all_done, by_day, logged_done, play, story, survey, told
 
 pytestmark = [pytest.mark.process]
 
@@ -47,7 +47,7 @@ def said_by(verdict: ChaosVerdict, uav: str, kind: type[B]) -> list[tuple[int, B
     ]
 
 
-@pytest.mark.parametrize("bus", [BusKind.ROUTER, BusKind.MESH])
+@pytest.mark.parametrize("bus", by_day(BusKind.ROUTER))
 def test_a_restarted_agent_resumes_its_task_while_its_vehicle_flies_on(
     tmp_path: Path, bus: BusKind
 ) -> None:
@@ -86,7 +86,7 @@ def test_a_restarted_agent_resumes_its_task_while_its_vehicle_flies_on(
     assert all(later <= earlier + 1.0 for earlier, later in pairwise(left_m))
 
 
-@pytest.mark.parametrize("bus", [BusKind.ROUTER, BusKind.MESH])
+@pytest.mark.parametrize("bus", by_day(BusKind.MESH))
 def test_a_hung_agents_tasks_go_to_others_and_it_comes_back_in_peace(
     tmp_path: Path, bus: BusKind
 ) -> None:
