@@ -37,7 +37,7 @@ def test_faultless_execution_is_never_worth_less_than_its_plan(seed: int) -> Non
     assert result.executed_objective >= planned.objective - slack
 
 
-@pytest.mark.parametrize("seed", range(25))
+@pytest.mark.parametrize("seed", seeds(12, 40))
 def test_lists_of_lost_uavs_are_done_by_the_others(seed: int) -> None:
     mission = mission_of(seed, 5, 18)
     rng = np.random.default_rng(2000 + seed)
