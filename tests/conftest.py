@@ -9,8 +9,16 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
-settings.register_profile("any machine", settings(deadline=None))
-settings.load_profile("any machine")
+settings.register_profile("day", settings(deadline=None, max_examples=40))
+settings.register_profile("night", settings(deadline=None, max_examples=200))
+settings.load_profile("night")
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Where slow tests are left out, a property is tried with fewer examples, too."""
+    if "not slow" in config.getoption("markexpr"):
+        settings.load_profile("day")
+
 
 # What is collected stays to the end: to search it for garbage is a third of what collecting costs.
 gc.disable()
