@@ -25,7 +25,7 @@ _MapPoint = tuple[float, float]
 
 
 @dataclass(slots=True)
-class _Flight:
+class _ObservedFlight:
     """What is known of one UAV."""
 
     claim: Claim | None = None
@@ -47,13 +47,13 @@ class ObservedFlights:
     def __init__(self) -> None:
         self.closest_approach_m: float | None = None
         """Least distance seen of two UAVs in flight [m]; None until two were."""
-        self._flights: dict[str, _Flight] = {}
+        self._flights: dict[str, _ObservedFlight] = {}
 
     # -- what is heard ------------------------------------------------------------------
 
     def hear_status(self, uav: str, status: Status, layer_m: float) -> None:
         """A UAV tells where it is, ``layer_m`` above that."""
-        flight = self._flights.setdefault(uav, _Flight())
+        flight = self._flights.setdefault(uav, _ObservedFlight())
         if status.mission_s is None or status.position_enu_m is None:
             return
         if status.phase is StatusPhase.HOME:
@@ -82,7 +82,7 @@ class ObservedFlights:
 
     def _hear_claim(self, uav: str, claim: Claim) -> None:
         """A UAV says what it is about."""
-        flight = self._flights.setdefault(uav, _Flight())
+        flight = self._flights.setdefault(uav, _ObservedFlight())
         before, flight.claim = flight.claim, claim
         if claim.task is not None:
             flight.claims[claim.task] = claim
@@ -98,7 +98,7 @@ class ObservedFlights:
 
     def _hear_outcome(self, uav: str, outcome: Outcome) -> None:
         """An attempt is over; the claim on what comes next may have been heard before."""
-        flight = self._flights.setdefault(uav, _Flight())
+        flight = self._flights.setdefault(uav, _ObservedFlight())
         known = {(claim.task, end_s) for claim, end_s, _ in flight.visits}
         claim = flight.claims.get(outcome.task)
         if claim is None:
@@ -114,7 +114,7 @@ class ObservedFlights:
         bases = {str(base.id): base.position_enu_m for base in mission.bases}
         schedule = {}
         for uav in mission.uavs:
-            flight = self._flights.get(str(uav.id), _Flight())
+            flight = self._flights.get(str(uav.id), _ObservedFlight())
             here: _MapPoint = uav.position_enu_m[:2]
             entries: list[ScheduleEntry] = []
             for claim, end_s, landed_s in flight.visits:

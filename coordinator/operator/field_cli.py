@@ -114,22 +114,20 @@ def add(
 
     check_reason_and_ids(reason, ("--mission", mission), ("ID", name))
     source, drawn = _drawn(name, polygon, polygon_deg, file)
+    heights_m = (
+        drawn.floor_m if floor_m is None else floor_m,
+        drawn.ceiling_m if ceiling_m is None else ceiling_m,
+    )
     try:
         wish = NewZone(
-            name,
-            drawn.polygon,
-            drawn.holes,
-            drawn.in_degrees,
-            drawn.floor_m if floor_m is None else floor_m,
-            drawn.ceiling_m if ceiling_m is None else ceiling_m,
+            *(name, drawn.polygon, drawn.holes, drawn.in_degrees, *heights_m),
             inclusive or drawn.inclusive,
             replace,
             reason,
         )
     except UnsoundZoneError as fault:
         raise InputError(Fault(source, "", str(fault), fault.remedy)) from fault
-    reach = MissionConnection(mission, timeout_s, seat, speedup)
-    return submit(wish, reach, "ID", json=json)
+    return submit(wish, MissionConnection(mission, timeout_s, seat, speedup), "ID", json=json)
 
 
 @zone.command("remove", help=_REMOVE_HELP, short_help="Take a zone away.")

@@ -80,5 +80,7 @@ def test_what_a_uav_can_reach_no_more_settles_the_mission() -> None:
     for situation in unfinished:
         assert situation.field is not None
         if situation.is_settled:
-            assert predicted(situation, COURSE).lists == dict.fromkeys(situation.problem.uav_ids, ())
+            assert predicted(situation, COURSE).lists == dict.fromkeys(
+                situation.problem.uav_ids, ()
+            )
     assert any(situation.is_settled for situation in unfinished)
