@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping
 
 from agent.core.announcer import Announcer
 from agent.core.context import AgentContext, AgentPart
+from agent.core.field_tasking import FieldTasking
 from agent.core.interface import Action, Event, OrderVehicle, Telemetry
 from agent.core.memory import RecoveredState, SaveCondition
 from agent.core.mission_view import MissionView, Peers
@@ -28,7 +29,6 @@ from agent.core.states import (
     Trigger,
 )
 from agent.core.stop_conditions import BusLossTimer, EndCondition, OperatorCommands
-from agent.core.tasking import Tasking
 from agent.core.vehicle_commander import VehicleCommander
 from swarm.protocol.board import RuleMaker, rule_of
 from swarm.protocol.events import (
@@ -106,7 +106,7 @@ class AgentCore(AgentPart):
             machine=AgentStateMachine(self._note_impossible),
         )
         super().__init__(context)
-        self._tasking = Tasking(context, make_rule)
+        self._tasking = FieldTasking(context, make_rule)
         self._ending = EndCondition(context)
         self._commander = VehicleCommander(context, self._tasking, self._ending)
         self._sync = StateSync(context, self._tasking)
@@ -136,7 +136,8 @@ class AgentCore(AgentPart):
         """
         if isinstance(event, Telemetry) and self._changes_nothing_else(now_s):
             self._mission_view.move(event)
-            return []
+            if not self._tasking.measure(now_s):
+                return []
         if not self._machine.has_ended:
             if self._stall_detector.late(now_s):
                 self._sync.held_up(now_s)
@@ -257,8 +258,10 @@ class AgentCore(AgentPart):
             self._commander.go_home(f"without the bus for {self._bus_loss.patience_s:g} s", now_s)
         if self._is_beginning:
             self._begin(now_s)
+        self._heed_zones(now_s)
         if self._machine.takes_tasks and self._mission_view.running:
             self._go_on(now_s)
+        self._go_home_if_spent(now_s)
         if not self._machine.has_ended:
             lacking = self.state is AgentState.SYNCING
             self._actions += self._queries.questions(now_s, lacking=lacking)
@@ -266,10 +269,27 @@ class AgentCore(AgentPart):
                 lambda: self._status(now_s), now_s, learned=self._machine.acts
             )
 
+    def _heed_zones(self, now_s: float) -> None:
+        """Fly other ways at once where zones have changed."""
+        if not self._tasking.zones_changed():
+            return
+        if self.state in HEADED_HOME:
+            self._commander.reroute()
+        elif self._machine.takes_tasks and self._mission_view.running:
+            self._tasking.reroute(now_s)
+
+    def _go_home_if_spent(self, now_s: float) -> None:
+        """Bring a UAV that stands by nothing home before its battery is used up."""
+        reason = self._tasking.spent(now_s)
+        if reason is not None and self._machine.acts:
+            self._commander.go_home(reason, now_s)
+
     def _go_on(self, now_s: float) -> None:
         """Do what the tasks ask for; whoever is alone then is woken by nobody but itself."""
         before = self.phase, self._tasking.undecided
+        self._tasking.advance_in_field(now_s)
         self._tasking.advance(now_s, informed=self._queries.current)
+        self._tasking.head_home_in_time(now_s)
         if before != (self.phase, self._tasking.undecided):
             self._go_home_if_over(now_s)
 
@@ -309,9 +329,12 @@ class AgentCore(AgentPart):
                 self._announcer.explain(waits)
                 self._log(waits, uav=self.uav)
             return
-        self._commander.prepare(me, Trigger.SYNCED)
         claim = self.replica.claims.get(self.uav)
+        if claim is not None and self._mission_view.said_to_run and self._tasking.stand(now_s):
+            return
+        self._commander.prepare(me, Trigger.SYNCED)
         if claim is not None and self._mission_view.running:
+            self._tasking.recall(claim)
             self._tasking.resume(claim, now_s)
 
     # -- what takes it from its tasks ---------------------------------------------------

@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
@@ -211,6 +212,18 @@ class RecordingRule:
         return found or ((decision.task, decision.score),)
 
 
+class TaskDecision(Protocol):
+    """What a choice tells of a decision, whatever it was made by."""
+
+    @property
+    def score(self) -> float | None:
+        """By the rule in force."""
+
+    @property
+    def second_score(self) -> float | None:
+        """Of the best task it did not take."""
+
+
 class ChoiceReporter(AgentPart):
     """Reports the choices of one agent in this life of it."""
 
@@ -258,6 +271,39 @@ class ChoiceReporter(AgentPart):
                     Candidate(problem.task_ids[task], score)
                     for task, score in recording_rule.valued(problem, decision)
                 ),
+                basis=self._basis(turn, head, before),
+            )
+            return self._announcer.say(choice).message
+
+        return PublishLast(make)
+
+    def made_in_field(
+        self,
+        turn: DecisionTurn,
+        epoch: PlanEpoch,
+        decision: TaskDecision,
+        claim: Claim,
+        left: str | None,
+    ) -> PublishLast:
+        """The same of a task chosen under the field's constraints."""
+        self._number += 1
+        head, before = self._replica.heads.get(self._uav), self._announcer.claimed
+        number, task, score = self._number, str(claim.task), decision.score or 0.0
+
+        def make() -> Message:
+            choice = Choice(
+                number=number,
+                task=task,
+                left=left,
+                chosen_s=turn.now_s,
+                epoch=epoch.number,
+                rule=epoch.rule,
+                rank=claim.rank,
+                score=score,
+                second_score=decision.second_score,
+                certificate=False,
+                completion_s=claim.completion_s,
+                candidates=(Candidate(task, score),),
                 basis=self._basis(turn, head, before),
             )
             return self._announcer.say(choice).message

@@ -11,6 +11,7 @@ from enum import Enum
 
 from agent.core.interface import Telemetry
 from swarm.protocol.board import TaskBoard, TaskState, winner
+from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.fields import Point
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import (
@@ -46,6 +47,8 @@ class MissionView:
         self.telemetry: Telemetry | None = None
         """The newest of the own vehicle."""
         self._place_enu_m: Point | None = None
+        self._stands_enu_m: Point | None = None
+        """Where it stands on the ground, between two flights."""
         self._uav = uav
         self._replica = replica
         self.clock = MissionClock()
@@ -73,8 +76,12 @@ class MissionView:
                 return MissionChange.OTHER if board.get(task) == entry else MissionChange.OPENING
             case MissionConfig() | TaskEntry() | Outcome(result=AttemptResult.FAILED):
                 return MissionChange.OPENING
+            case ZoneEdit() | UavReady():
+                return MissionChange.OPENING
             case Claim(task=task):
                 left = before is not None and before.task != task and self.is_open(before.task)
+                if before is not None and before.base is not None:
+                    left |= (before.base, before.stage) != (body.base, body.stage)
                 return MissionChange.OPENING if left else MissionChange.CLAIM
             case PlanEpoch(number=number) if epoch is None or number != epoch.number:
                 return MissionChange.OPENING
@@ -124,7 +131,7 @@ class MissionView:
     @property
     def place_enu_m(self) -> Point | None:
         """Where the UAV is [m; mission origin], without its height layer; None if not known."""
-        return self._place_enu_m
+        return self._place_enu_m if self._stands_enu_m is None else self._stands_enu_m
 
     def move(self, telemetry: Telemetry) -> None:
         """The vehicle has told where it is."""
@@ -135,6 +142,15 @@ class MissionView:
     def arrive(self, place_enu_m: Point) -> None:
         """The vehicle has reached that place; where exactly it is follows with its next word."""
         self._place_enu_m = place_enu_m
+
+    def stand(self, place_enu_m: Point) -> None:
+        """The vehicle has landed there, where it is whatever height it tells."""
+        self._stands_enu_m = place_enu_m
+
+    def leave_ground(self) -> None:
+        """The vehicle takes off from where it stands, straight up."""
+        if self._stands_enu_m is not None:
+            self._place_enu_m, self._stands_enu_m = self._stands_enu_m, None
 
     def take_off(self) -> None:
         """The vehicle is in the air; one that has not told where it is hovers at its start."""

@@ -16,7 +16,7 @@ from swarm.protocol.operator_commands import (
     newest_command,
 )
 from swarm.protocol.registers import Replica
-from swarm.protocol.uav_messages import StatusPhase
+from swarm.protocol.uav_messages import Claim, ClaimPhase, StatusPhase
 
 
 class EndCondition(AgentPart):
@@ -89,9 +89,14 @@ class EndCondition(AgentPart):
     def _peers_at_work(self) -> bool:
         credible = self._peers.credible
         return any(
-            uav in credible and self._mission_view.is_open(claim.task)
+            uav in credible and (self._mission_view.is_open(claim.task) or _visits_base(claim))
             for uav, claim in self._replica.claims.items()
         )
+
+
+def _visits_base(claim: Claim) -> bool:
+    """Whether who claims so gets itself a full battery: it may do something with it."""
+    return claim.base is not None and claim.phase in (ClaimPhase.PROPOSED, ClaimPhase.HELD)
 
 
 class BusLossTimer:

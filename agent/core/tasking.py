@@ -3,11 +3,13 @@
 Decides whenever the UAV is free, claims and flies at once, turns to something better that opens on
 the way, gives way to stronger claims and waits idle while there is nothing for it. A claim's way:
 `Tasking.advance`, which `AgentCore.step` calls, decides (`decide`), claims (`Announcer.say`) and
-orders the vehicle to the task (`GoTo`), all in one step.
+orders the vehicle to the task (`GoTo`), all in one step. What the field's constraints add is in
+agent.core.field_tasking; a plain mission meets nothing of it.
 """
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from dataclasses import replace
 
 from agent.core.context import AgentContext, AgentPart
@@ -19,7 +21,7 @@ from agent.core.decision import (
     decide,
     decide_diversion,
 )
-from agent.core.interface import GoTo
+from agent.core.flights import Flights
 from agent.core.states import (
     FREE,
     TAKES_TARGETS,
@@ -37,7 +39,7 @@ from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome
 
 
-class Tasking(AgentPart):
+class Tasking(AgentPart, ABC):
     """What one UAV does about tasks, and its claim.
 
     Args:
@@ -47,13 +49,12 @@ class Tasking(AgentPart):
     def __init__(self, context: AgentContext, make_rule: RuleMaker = rule_of) -> None:
         super().__init__(context)
         self._choices = ChoiceReporter(context)
+        self._flights = Flights(context)
         self._make_rule = make_rule
         self._rule: Rule | None = None
         self._rule_basis: object = None
         self._free = FreePeriod(0.0)
         self._attempt = TaskAttempt()
-        self._leg = 0
-        """Number of the last order to fly somewhere; what the vehicle says of others is late."""
         self._refused = RefusedTasks(context.timing.reconsider_s)
         self._diversion_due = False
         """Whether something has opened that may be worth turning to in flight."""
@@ -83,7 +84,7 @@ class Tasking(AgentPart):
 
     def label(self, leg: int) -> dict[str, object]:
         """For the log: which choice that leg came of, if it is the one being flown."""
-        return self._choices.label if leg == self._leg and self._task() is not None else {}
+        return self._choices.label if leg == self._flights.leg and self._task() is not None else {}
 
     def resume(self, claim: Claim, now_s: float) -> None:
         """An earlier life of this agent claimed so: stand by it, if it still counts.
@@ -149,19 +150,20 @@ class Tasking(AgentPart):
     def arrive(self, leg: int, now_s: float) -> None:
         """The vehicle is where that leg ends."""
         task = self._task()
-        if leg != self._leg or task is None or not self._machine.take(Trigger.ARRIVED):
+        if leg != self._flights.leg or task is None or not self._machine.take(Trigger.ARRIVED):
             return
         self._mission_view.arrive(task.position_enu_m)
         self._attempt.served_at_s = now_s + task.service_s
 
     def fail(self, leg: int) -> None:
         """The attempt at the task of that leg fails; its service takes its time all the same."""
-        self._attempt.fails |= leg == self._leg and self._task() is not None
+        self._attempt.fails |= leg == self._flights.leg and self._task() is not None
 
     def refuse(self, leg: int, reason: str, now_s: float) -> None:
         """The vehicle will not fly that leg: leave its task alone for a while."""
         task = self._task()
-        if leg == self._leg and task is not None and self._machine.allows(Trigger.CLAIM_LOST):
+        current = leg == self._flights.leg and task is not None
+        if current and task is not None and self._machine.allows(Trigger.CLAIM_LOST):
             self._refused.add(task.task, now_s)
             self._release(f"vehicle refused: {reason}", now_s)
 
@@ -178,10 +180,12 @@ class Tasking(AgentPart):
         if self._diversion_due and ready:
             self._divert(now_s)
         if self._machine.state in FREE and self._free.to_decide:
-            if ready:
+            if not ready:
+                self._give_up_claim()
+            elif self._flights.problem is None:
                 self._decide(now_s)
             else:
-                self._give_up_claim()
+                self._decide_in_field(now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `advance` will next have something to do."""
@@ -195,7 +199,8 @@ class Tasking(AgentPart):
             return
         mission_s = self._mission_view.mission_s(now_s)
         result = AttemptResult.FAILED if self._attempt.fails else AttemptResult.DONE
-        outcome = Outcome(task.task, result, self._attempt_at(task.task), mission_s)
+        way = None if self.claim is None else self.claim.reversed
+        outcome = Outcome(task.task, result, self._attempt_at(task.task), mission_s, way)
         # The next claim, made in this same step, replaces the old one on the bus.
         self._machine.take(Trigger.SERVED)
         self._become_free(mission_s)
@@ -219,6 +224,9 @@ class Tasking(AgentPart):
         self._diversion_due = False
         claim, epoch = self.claim, self._replica.epoch
         if claim is None or epoch is None or self._machine.state is not AgentState.FLYING:
+            return
+        if self._flights.problem is not None:
+            self._divert_in_field(now_s)
             return
         rule = self._rule_of(epoch)
         if not isinstance(rule, GuidedRule):
@@ -336,11 +344,10 @@ class Tasking(AgentPart):
 
     def _stay_idle(self, now_s: float) -> None:
         self._give_up_claim()
-        free, telemetry = self._free, self._mission_view.telemetry
-        if free.adrift and telemetry is not None:
+        free = self._free
+        if free.adrift:
             # Nothing to fly to any more: stop here rather than at a lost target.
-            self._leg += 1
-            self._order(GoTo(self._leg, telemetry.position_enu_m))
+            self._flights.stop()
         free.adrift, free.to_decide, free.found_nothing = False, False, True
         patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
         free.awaits_peers = patience_ends_s is not None
@@ -364,7 +371,7 @@ class Tasking(AgentPart):
     def _withdraw(self, phase: ClaimPhase, now_s: float, *, handed_over: bool) -> None:
         mission_s = self._mission_view.mission_s(now_s)
         self._become_free(mission_s)
-        self._say(Claim(phase, None, mission_s, 0, mission_s, handed_over))
+        self._say(self._situated(Claim(phase, None, mission_s, 0, mission_s, handed_over)))
 
     def _task(self) -> TaskEntry | None:
         claim = self.claim
@@ -376,11 +383,22 @@ class Tasking(AgentPart):
         return 1 if earlier is None else earlier.attempt + 1
 
     def _order_to(self, task: TaskEntry, *, idled: bool = False) -> None:
-        self._leg += 1
-        place_enu_m = self._mission_view.in_layer(task.position_enu_m)
-        attempt = self._attempt_at(task.task)
-        self._order(GoTo(self._leg, place_enu_m, task.service_s, idled, task.task, attempt))
+        self._flights.to_task(task, self._attempt_at(task.task), idled=idled)
 
     def _say_idle(self) -> None:
         since_s = self._free.since_s
-        self._say(Claim(ClaimPhase.IDLE, None, since_s, 0, since_s))
+        self._say(self._situated(Claim(ClaimPhase.IDLE, None, since_s, 0, since_s)))
+
+    # -- where constraints ask for more: nothing of it in a plain mission -----------------
+
+    @abstractmethod
+    def _decide_in_field(self, now_s: float) -> None:
+        """Decide under constraints, being free."""
+
+    @abstractmethod
+    def _divert_in_field(self, now_s: float) -> None:
+        """Leave the task for a better one under constraints."""
+
+    @abstractmethod
+    def _situated(self, claim: Claim) -> Claim:
+        """``claim`` with where the UAV stands, and until when it can stay in the air."""

@@ -7,6 +7,7 @@ from each reason to stop or to go home.
 from __future__ import annotations
 
 from agent.core.context import AgentContext, AgentPart
+from agent.core.field_tasking import FieldTasking
 from agent.core.interface import (
     Arrived,
     AttemptFailed,
@@ -18,18 +19,22 @@ from agent.core.interface import (
     Held,
     Hold,
     Home,
+    Landed,
     NotReady,
     Prepare,
     Refused,
     Return,
     ReturnAdvised,
     ReturnBegun,
+    Swap,
+    Swapped,
     Telemetry,
     VehicleOrder,
     VehicleReady,
     VehicleReport,
 )
 from agent.core.states import (
+    AT_BASE,
     HEADED_HOME,
     PAUSED_BY_OPERATOR,
     TAKES_TARGETS,
@@ -37,7 +42,6 @@ from agent.core.states import (
     Trigger,
 )
 from agent.core.stop_conditions import EndCondition
-from agent.core.tasking import Tasking
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import UavSpec
 from swarm.protocol.operator_commands import BEING_STOPPED, CANNOT_HOLD
@@ -55,7 +59,7 @@ class VehicleCommander(AgentPart):
         ending: when the mission is over.
     """
 
-    def __init__(self, context: AgentContext, tasking: Tasking, ending: EndCondition) -> None:
+    def __init__(self, context: AgentContext, tasking: FieldTasking, ending: EndCondition) -> None:
         super().__init__(context)
         self.exit_status = 0
         """Of the process, when it ends."""
@@ -68,6 +72,8 @@ class VehicleCommander(AgentPart):
         """Whether an earlier life was last heard to have it in the air."""
         self._flown = False
         """Whether it has been in the air in this life."""
+        self._reason = ""
+        """Why it flies home."""
         self._caution = ""
         """What people should know of it in flight."""
 
@@ -89,10 +95,15 @@ class VehicleCommander(AgentPart):
                 self._log("caution", reason=reason)
             case Arrived(leg):
                 self._tasking.arrive(leg, now_s)
+            case Landed(leg):
+                self._tasking.touch_down(leg, now_s)
+            case Swapped(leg):
+                self._tasking.swapped(leg, now_s)
             case AttemptFailed(leg):
                 self._tasking.fail(leg)
             case Telemetry():
                 self._mission_view.move(report)
+                self._tasking.measure(now_s)
             case Refused(order, reason):
                 self._give_up_order(order, reason, now_s)
             case HandedOver(reason, silent):
@@ -126,8 +137,11 @@ class VehicleCommander(AgentPart):
     def _give_up_order(self, order: VehicleOrder, reason: str, now_s: float) -> None:
         label = self._tasking.label(order.leg) if isinstance(order, GoTo) else {}
         self._log("vehicle refused", order=str(order), reason=reason, **label)
-        if isinstance(order, GoTo):
+        if isinstance(order, GoTo | Swap):
             self._tasking.refuse(order.leg, reason, now_s)
+        elif isinstance(order, Return) and (order.path_enu_m or order.land):
+            # Better home by the vehicle's own way than nowhere.
+            self._order(Return(order.reason, order.resume))
         elif isinstance(order, Prepare) and self._flew_before:
             # It may be in the air.
             self.go_home(reason, now_s, status=1, hurry=True)
@@ -172,7 +186,7 @@ class VehicleCommander(AgentPart):
         if not self._machine.allows(Trigger.HOLD):
             return
         before = self._machine.state
-        self._flew_before |= before in TAKES_TARGETS
+        self._flew_before |= before in TAKES_TARGETS | AT_BASE
         untouched = before is AgentState.SYNCING and not self._flew_before
         if before not in HEADED_HOME:
             self._tasking.pause(now_s)
@@ -185,7 +199,8 @@ class VehicleCommander(AgentPart):
         """Take part again, as far as there is anything to take part in."""
         me = self._mission_view.me
         if self._machine.allows(Trigger.RESUME) and me is not None:
-            self.prepare(me, Trigger.RESUME)
+            if not self._tasking.stand(now_s):
+                self.prepare(me, Trigger.RESUME)
         else:
             self.go_home(reason, now_s)
 
@@ -213,18 +228,38 @@ class VehicleCommander(AgentPart):
             self.exit_status = max(self.exit_status, status)
         self._turn_home(trigger, reason, via_enu_m, now_s)
 
+    def reroute(self) -> None:
+        """Zones have changed while it flies home: go on by another way."""
+        home = self._tasking.way_home()
+        if home is not None and self._machine.state not in PAUSED_BY_OPERATOR:
+            self._order(self._return(self._reason, None))
+
     def _turn_home(
         self, trigger: Trigger, reason: str, via_enu_m: Point | None, now_s: float
     ) -> None:
         """Order the return, from whatever the vehicle does now."""
-        before = self._machine.state
+        before, order = self._machine.state, self._return(reason, via_enu_m)
         if not self._machine.take(trigger):
             return
         if before not in HEADED_HOME:
             self._take_no_further_part(now_s)
         self._announcer.explain(reason)
         self._log("returning", reason=reason)
-        self._order(Return(reason, self._flew_before, via_enu_m))
+        self._order(order)
+
+    def _return(self, reason: str, via_enu_m: Point | None) -> Return:
+        """Home by the start, or at once; round zones to the nearest base where there are any."""
+        self._reason = reason
+        home = self._tasking.way_home()
+        if home is None:
+            return Return(reason, self._flew_before, via_enu_m)
+        return Return(
+            reason,
+            self._flew_before,
+            home.target_enu_m,
+            path_enu_m=home.via_enu_m,
+            land=home.base is not None,
+        )
 
     def _take_no_further_part(self, now_s: float) -> None:
         self._ending.settle()

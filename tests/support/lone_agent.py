@@ -13,6 +13,7 @@ from agent.core.interface import (
     Event,
     GoTo,
     OrderVehicle,
+    Swap,
     Telemetry,
     VehicleOrder,
     VehicleReady,
@@ -201,15 +202,20 @@ class LoneAgent:
         """The vehicle reports to be where it was last sent."""
         return self.happen(Arrived(self.leg), mission_s)
 
-    def be_at(self, position_enu_m: Point) -> list[Action]:
+    def be_at(
+        self,
+        position_enu_m: Point,
+        battery_frac: float | None = 0.5,
+        mission_s: float | None = None,
+    ) -> list[Action]:
         """Telemetry from that place, height layer included."""
-        return self.happen(Telemetry(position_enu_m, (0.0, 0.0, 0.0), 0.5))
+        return self.happen(Telemetry(position_enu_m, (0.0, 0.0, 0.0), battery_frac), mission_s)
 
     # -- what came of it ---------------------------------------------------------------
 
     @property
     def leg(self) -> int:
-        flights = [order.leg for order in orders(self.log) if isinstance(order, GoTo)]
+        flights = [order.leg for order in orders(self.log) if isinstance(order, GoTo | Swap)]
         return flights[-1]
 
     @property

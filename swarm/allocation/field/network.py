@@ -121,11 +121,22 @@ class FieldNetwork:
         flown_m[:, 2] += layer_m if self._in_layer[end] else layer_m * (1.0 - share)
         return flown_m
 
+    def way_out_m(
+        self, uav: int, place_enu_m: Sequence[float] | FloatArray
+    ) -> tuple[float, float, float] | None:
+        """The nearest place outside of all zones [m; ENU], as heights are given; None: it is one.
+
+        Whoever has nowhere to go is told where it is.
+        """
+        place_m, low_m, high_m = self._placed(uav, place_enu_m)
+        out_m, free = self._airspace.concerning(low_m, high_m).way_out_m(place_m[:, :2])
+        return None if free[0] else (float(out_m[0, 0]), float(out_m[0, 1]), float(place_m[0, 2]))
+
     def _kind_of(self, uav: int) -> tuple[FlightModel, LegNetwork]:
         return self._kinds[int(self.kind[uav])]
 
     def _placed(
-        self, uav: int, place_enu_m: Sequence[float] | FloatArray, flown_m: float | None
+        self, uav: int, place_enu_m: Sequence[float] | FloatArray, flown_m: float | None = None
     ) -> tuple[FloatArray, float, float]:
         place_m = np.asarray(place_enu_m, dtype=np.float64).reshape(1, 3)
         if self._band_m is not None:

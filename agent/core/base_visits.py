@@ -1,0 +1,320 @@
+"""One UAV's visits to bases: flown to, waited for above, landed at, left with a full battery.
+
+Slots of a base are held by claims, as tasks are (swarm.protocol.bases): a UAV lands when nobody
+before it needs the slot, and says at each stage how far it is. Leaves out: who decides to fly to
+a base, and what comes after it (agent.core.field_tasking).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from agent.core.context import AgentContext, AgentPart
+from agent.core.energy import SortieClock
+from agent.core.flights import Flights
+from agent.core.states import AT_BASE, VISITS_BASE, AgentState, Trigger
+from swarm.allocation.field.ways import Way
+from swarm.protocol import bases
+from swarm.protocol.field_messages import BaseSpec
+from swarm.protocol.messages import Stamp
+from swarm.protocol.operator_commands import readiness
+from swarm.protocol.timing import earliest
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
+
+_ON_GROUND = (BaseStage.LANDED, BaseStage.PARKED)
+
+
+@dataclass(slots=True)
+class BaseVisit:
+    """What is going to happen of a visit to a base, and when; made anew for each."""
+
+    held_at_s: float | None = None
+    """When its claim turns from proposed to held."""
+    waited_at_s: float | None = None
+    """When it has waited for as long as others may object."""
+    waited: bool = False
+    """Whether it has."""
+
+    def next_deadline_s(self) -> float | None:
+        """When any of that is due."""
+        return earliest(self.held_at_s, self.waited_at_s)
+
+
+class BaseVisits(AgentPart):
+    """What one UAV does at bases, and its claim meanwhile.
+
+    Args:
+        flights: sends the vehicle.
+        sortie: how long it can stay in the air.
+        become_free: told when a visit is over, and whether the vehicle flies on without aim.
+    """
+
+    def __init__(
+        self,
+        context: AgentContext,
+        flights: Flights,
+        sortie: SortieClock,
+        become_free: Callable[[float, bool], None],
+    ) -> None:
+        super().__init__(context)
+        self._flights = flights
+        self._sortie = sortie
+        self._become_free = become_free
+        self._visit = BaseVisit()
+        self._on_ground: bool | None = None
+        """Whether the vehicle stands at the base; None: as an earlier life has claimed."""
+        self._vouched: dict[str, tuple[Stamp, Claim | None]] = {}
+        """By UAV, the operator's last word that it is ready, and what it claimed at the time."""
+
+    # -- what is known -------------------------------------------------------------------
+
+    @property
+    def claim(self) -> Claim | None:
+        """The UAV's claim register, of this life or an earlier one."""
+        return self._replica.claims.get(self._uav)
+
+    @property
+    def stands_at(self) -> str | None:
+        """The base on whose ground the vehicle is; None if it is in the air."""
+        claim = self.claim
+        if claim is None or claim.stage not in _ON_GROUND or self._on_ground is False:
+            return None
+        return claim.base
+
+    @property
+    def is_parked(self) -> bool:
+        """Whether it stands there beside the slots."""
+        return self.claim is not None and self.claim.stage is BaseStage.PARKED
+
+    def blocking(self) -> dict[str, str]:
+        """Lost UAV -> base on whose slot it stands until it is heard, or said to be ready."""
+        claims = self._replica.claims
+        lost = claims.keys() - self._peers.credible - {self._uav}
+        for uav, stamp in readiness(self._replica).items():
+            if uav not in self._vouched or self._vouched[uav][0] != stamp:
+                self._vouched[uav] = stamp, claims.get(uav)
+        ready = {uav for uav in lost if self._vouched.get(uav, (None, None))[1] == claims.get(uav)}
+        return bases.blocking(claims, lost, ready)
+
+    def situated(self, claim: Claim) -> Claim:
+        """``claim`` with the base at which the vehicle stands, and until when it can fly."""
+        base, before = self.stands_at, self.claim
+        if base is None or before is None:
+            return replace(claim, sortie_end_s=self._sortie.told_s)
+        # Who is gone for good needs no slot, unless somebody else has the vehicle there.
+        leaves = claim.phase is ClaimPhase.OUT and not claim.handed_over
+        stage = BaseStage.PARKED if leaves else before.stage
+        return replace(claim, base=base, stage=stage)
+
+    def next_deadline_s(self) -> float | None:
+        """When `advance` will next have something to do."""
+        visits = self._machine.state in VISITS_BASE
+        return self._visit.next_deadline_s() if visits else None
+
+    # -- on its way ----------------------------------------------------------------------
+
+    def leave_ground(self) -> str | None:
+        """The vehicle takes off now; gives the base that it stood at, None if it is in the air."""
+        base, self._on_ground = self.stands_at, False
+        self._mission_view.leave_ground()
+        return base
+
+    def set_off(
+        self,
+        way: Way,
+        base: str,
+        since_s: float,
+        rank: int,
+        arrives_s: float,
+        ready_s: float,
+        now_s: float,
+    ) -> None:
+        """Fly to ``base`` that way, and claim it: free since then, predicted to be ready then."""
+        self._machine.take(Trigger.BASE_CHOSEN)
+        self._visit = BaseVisit(held_at_s=now_s + self._timing.objection_window_s)
+        self._fly(way, base)
+        self._say(
+            Claim(
+                ClaimPhase.PROPOSED,
+                None,
+                since_s,
+                rank,
+                ready_s,
+                base=base,
+                stage=BaseStage.APPROACHING,
+                arrives_s=arrives_s,
+                sortie_end_s=self._sortie.told_s,
+            )
+        )
+        self._log("flies to base", base=base, arrives_s=arrives_s)
+
+    def resume(self, claim: Claim, now_s: float) -> bool:
+        """Go on with an earlier life's visit, as it claimed; whether that can be done."""
+        way = None if claim.base is None else self._flights.way_to_base(claim.base)
+        if way is None or claim.base is None:
+            return False
+        self._machine.take(Trigger.BASE_CHOSEN)
+        held_s = now_s + self._timing.objection_window_s
+        self._visit = BaseVisit(None if claim.phase is ClaimPhase.HELD else held_s)
+        self._fly(way, claim.base)
+        self._say(claim)
+        self._log("resumes", base=claim.base)
+        return True
+
+    def reroute(self, now_s: float) -> None:
+        """Zones have changed: fly on another way, or to something else."""
+        claim = self.claim
+        if claim is None or claim.base is None:
+            return
+        way = self._flights.way_to_base(claim.base)
+        if way is None:
+            self.break_off("zones leave no way", now_s)
+        elif self._machine.state is AgentState.FLYING_TO_BASE:
+            arrives_s = self._mission_view.mission_s(now_s) + way.duration_s
+            later_s = max(0.0, arrives_s - (claim.arrives_s or arrives_s))
+            self._fly(way, claim.base)
+            ready_s = claim.completion_s + later_s
+            self._say(replace(claim, completion_s=ready_s, arrives_s=arrives_s))
+
+    def arrive(self, now_s: float) -> None:
+        """The vehicle is above the base: land, if there is a slot."""
+        claim, base = self.claim, self._base()
+        if claim is None or base is None or not self._machine.take(Trigger.ARRIVED):
+            return
+        self._mission_view.arrive(base.position_enu_m)
+        if claim.stage is not BaseStage.WAITING:  # an earlier life of it may have waited already
+            self._say(replace(claim, arrives_s=self._mission_view.mission_s(now_s)))
+        else:
+            self._visit.waited_at_s = now_s + self._timing.objection_window_s
+        self._land_or_wait(base, now_s)
+
+    def advance(self, now_s: float) -> None:
+        """What follows from the registers and the time."""
+        visit, claim = self._visit, self.claim
+        if self._machine.state not in VISITS_BASE or claim is None:
+            return
+        if visit.held_at_s is not None and visit.held_at_s <= now_s:
+            visit.held_at_s = None
+            self._say(replace(claim, phase=ClaimPhase.HELD))
+        if visit.waited_at_s is not None and visit.waited_at_s <= now_s:
+            visit.waited_at_s, visit.waited = None, True
+        base = self._base()
+        if base is None or (self._machine.state is not AgentState.SWAPPING and self._blocked(base)):
+            self.break_off("the base is gone" if base is None else "its slots are blocked", now_s)
+        elif self._machine.state is AgentState.ABOVE_BASE:
+            self._land_or_wait(base, now_s)
+
+    def break_off(self, reason: str, now_s: float) -> None:
+        """Give the base up, in the air."""
+        claim = self.claim
+        if claim is None or not self._machine.take(Trigger.CLAIM_LOST):
+            return
+        self._visit, self._on_ground = BaseVisit(), False
+        self._mission_view.leave_ground()
+        self._announcer.explain("")
+        self._become_free(self._mission_view.mission_s(now_s), True)
+        self._log("released", base=claim.base, reason=reason)
+
+    def _fly(self, way: Way, base: str) -> None:
+        self._flights.along(way, None, 1, 0.0)
+        self._announcer.explain(f"flies to base {base}")
+
+    def _base(self) -> BaseSpec | None:
+        claim = self.claim
+        return None if claim is None or claim.base is None else self._flights.base(claim.base)
+
+    def _blocked(self, base: BaseSpec) -> bool:
+        """Whether lost UAVs stand on all its slots, so that waiting is in vain."""
+        standing = sum(where == base.id for where in self.blocking().values())
+        return base.slots is not None and standing >= base.slots
+
+    # -- there ---------------------------------------------------------------------------
+
+    def _land_or_wait(self, base: BaseSpec, now_s: float) -> None:
+        claim, visit = self.claim, self._visit
+        if claim is None:
+            return
+        credible = self._peers.credible
+        claims = {uav: each for uav, each in self._replica.claims.items() if uav in credible}
+        claims[self._uav] = claim
+        everybody = claims, self.blocking()
+        if bases.may_land(self._uav, base.id, base.slots, *everybody, waited=visit.waited):
+            self._land(base, claim, now_s)
+        elif claim.stage is not BaseStage.WAITING and claim.phase is ClaimPhase.HELD:
+            visit.waited_at_s = now_s + self._timing.objection_window_s
+            self._announcer.explain(f"waits for a slot of base {base.id}")
+            self._say(replace(claim, stage=BaseStage.WAITING))
+            self._log("waits for a slot", base=base.id)
+
+    def _land(self, base: BaseSpec, claim: Claim, now_s: float) -> None:
+        self._machine.take(Trigger.SLOT_FREE)
+        self._visit, self._on_ground = BaseVisit(), False
+        ready_s = self._mission_view.mission_s(now_s) + base.swap_s
+        self._announcer.explain(f"swaps its battery at base {base.id}")
+        self._flights.swap(base)
+        held = replace(claim, phase=ClaimPhase.HELD, completion_s=ready_s)
+        self._say(replace(held, stage=BaseStage.LANDED))
+        self._log("lands", base=base.id)
+
+    def stand(self, now_s: float) -> bool:
+        """The vehicle stands at a base already: have its battery looked after from there.
+
+        Whether it does, by its last claim; its battery may be full, which is told at once then.
+        """
+        claim, base = self.claim, self._base()
+        if base is None or claim is None or claim.stage is None or claim.stage not in _ON_GROUND:
+            return False
+        if not self._machine.take(Trigger.STANDS_AT_BASE):
+            return False
+        self._stay(base, claim.stage, now_s)
+        return True
+
+    def stay(self, base: BaseSpec, now_s: float) -> None:
+        """The vehicle has refused to take off from ``base``: it stands there still."""
+        if self._machine.take(Trigger.STANDS_AT_BASE):
+            self._stay(base, BaseStage.LANDED, now_s)
+
+    def _stay(self, base: BaseSpec, stage: BaseStage, now_s: float) -> None:
+        self._visit, self._on_ground = BaseVisit(), True
+        self._sortie.land()
+        self._mission_view.stand(base.position_enu_m)
+        self._announcer.explain(f"stands at base {base.id}")
+        self._flights.swap(base)
+        mission_s = self._mission_view.mission_s(now_s)
+        ready_s = mission_s + base.swap_s
+        self._say(Claim(ClaimPhase.HELD, None, mission_s, 0, ready_s, base=base.id, stage=stage))
+        self._log("stands at base", base=base.id)
+
+    def touch_down(self, leg: int, now_s: float) -> None:
+        """The vehicle is on the ground, its battery about to be changed."""
+        claim, base = self.claim, self._base()
+        swaps = self._machine.state is AgentState.SWAPPING and leg == self._flights.leg
+        if not swaps or claim is None or base is None:
+            return
+        self._on_ground = True
+        self._sortie.land()
+        self._mission_view.stand(base.position_enu_m)
+        ready_s = self._mission_view.mission_s(now_s) + base.swap_s
+        if claim.completion_s != ready_s or claim.sortie_end_s is not None:
+            self._say(replace(claim, completion_s=ready_s, sortie_end_s=None))
+
+    def swapped(self, leg: int, now_s: float) -> None:
+        """The battery is full."""
+        claim, base = self.claim, self._base()
+        late = leg != self._flights.leg or claim is None or base is None
+        if late or claim is None or base is None or not self._machine.take(Trigger.SWAPPED):
+            return
+        self._on_ground = True
+        self._sortie.land()
+        self._mission_view.stand(base.position_enu_m)
+        self._announcer.explain(f"stands at base {claim.base}")
+        self._become_free(self._mission_view.mission_s(now_s), False)
+        self._log("battery swapped", base=claim.base)
+
+    def park(self) -> None:
+        """Nothing to do for now: leave the slot to others."""
+        claim = self.claim
+        at_base = self._machine.state in AT_BASE
+        if at_base and claim is not None and claim.stage is BaseStage.LANDED:
+            self._say(replace(claim, stage=BaseStage.PARKED))

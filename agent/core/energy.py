@@ -1,0 +1,79 @@
+"""How long one UAV may stay in the air: its sortie, counted from take-off and measured in flight.
+
+Energy is airborne time. A sortie begins at mission time 0, or when the UAV takes off from a base
+with a full battery, and has ended when it has landed; the reserve is never planned with. Leaves
+out: where it lands (agent.core.flights) and what follows if it must (agent.core.field_tasking).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from swarm.protocol.messages import UavSpec
+
+TOLERANCE_S: Final = 1e-6
+"""All limits are inclusive, by so much [s]."""
+_MEASURED_EARLIER_S: Final = 1.0
+"""What the battery says counts where it ends the sortie by more than that earlier: less is how
+finely it is told."""
+
+
+class SortieClock:
+    """The end of one UAV's sortie, in mission time; infinite while nothing ends it."""
+
+    def __init__(self) -> None:
+        self._counted_s: float | None = None
+        """By the time since take-off [s]; None before the first one of this life."""
+        self._measured_s = math.inf
+        """By the charge that the vehicle told last [s]."""
+
+    @property
+    def end_s(self) -> float:
+        """Mission time by which the UAV must have landed, its reserve kept [s]."""
+        if self._counted_s is None:
+            return math.inf
+        if self._measured_s < self._counted_s - _MEASURED_EARLIER_S:
+            return self._measured_s
+        return self._counted_s
+
+    @property
+    def told_s(self) -> float | None:
+        """The same as claims tell it: None if nothing ends it."""
+        return None if math.isinf(self.end_s) else self.end_s
+
+    def begin(self, me: UavSpec, mission_s: float) -> None:
+        """The vehicle is in the air for the first time: unless more is known, since just now.
+
+        Who is in the air before the mission begins counts from mission time 0.
+        """
+        if self._counted_s is None:
+            self._counted_s = mission_s + _budget_s(me, me.charge_frac)
+
+    def recall(self, sortie_end_s: float | None) -> None:
+        """An earlier life of this agent said so; nothing of one that ended on the ground."""
+        if sortie_end_s is not None:
+            self._counted_s = sortie_end_s
+
+    def depart(self, me: UavSpec, mission_s: float) -> None:
+        """It takes off with a full battery."""
+        self._counted_s, self._measured_s = mission_s + _budget_s(me, 1.0), math.inf
+
+    def land(self) -> None:
+        """It stands at a base: nothing is used up."""
+        self._counted_s, self._measured_s = math.inf, math.inf
+
+    def measure(self, me: UavSpec, battery_frac: float | None, mission_s: float) -> bool:
+        """Its vehicle has told its charge; whether the sortie ends earlier than was known."""
+        if me.endurance_s is None or battery_frac is None or self._counted_s == math.inf:
+            return False
+        before_s = self.end_s
+        self._measured_s = mission_s + (battery_frac - me.reserve_frac) * me.endurance_s
+        return self.end_s < before_s - TOLERANCE_S
+
+
+def _budget_s(me: UavSpec, charge_frac: float) -> float:
+    """Airborne time that may be planned with [s]; infinite if it is endless."""
+    if me.endurance_s is None:
+        return math.inf
+    return charge_frac * me.endurance_s - me.reserve_frac * me.endurance_s

@@ -1,0 +1,492 @@
+"""The tasks of one UAV where energy, bases, windows, lines and zones constrain them.
+
+What `agent.core.tasking` does in a plain mission stays as it is; here is what is added: it decides
+under the constraints, flies round zones, waits for a window, flies lines, gives up what can't be
+done in time any more, visits bases, and heads home before its battery is used up.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+from agent.core.base_visits import BaseVisits
+from agent.core.context import AgentContext
+from agent.core.decision import DecisionTurn, RefusedTasks
+from agent.core.energy import TOLERANCE_S, SortieClock
+from agent.core.field_decision import (
+    FieldRule,
+    FieldTurnDecision,
+    decide_in_field,
+    divert_in_field,
+    field_rule_of,
+)
+from agent.core.flights import HomeFlight
+from agent.core.states import (
+    AT_BASE,
+    PAUSED_BY_OPERATOR,
+    VISITS_BASE,
+    AgentState,
+    TaskAttempt,
+    Trigger,
+)
+from agent.core.tasking import Tasking
+from agent.core.time_limits import WITHOUT_AIM, TimeLimits, ends_of
+from swarm.allocation.field import FieldProblem
+from swarm.allocation.field.ways import Way
+from swarm.protocol.board import RuleMaker, ranks, rule_of
+from swarm.protocol.messages import PlanEpoch, TaskEntry
+from swarm.protocol.timing import earliest
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
+
+
+class FieldTasking(Tasking):
+    """What one UAV does about tasks and bases, and its claim."""
+
+    def __init__(self, context: AgentContext, make_rule: RuleMaker = rule_of) -> None:
+        super().__init__(context, make_rule)
+        self._sortie = SortieClock()
+        self._visits = BaseVisits(context, self._flights, self._sortie, self._visit_over)
+        self._limits = TimeLimits(context, self._flights, self._sortie)
+        self._refused_bases = RefusedTasks(context.timing.reconsider_s)
+        self._departed_from: str | None = None
+        """The base that it has just been sent off from, until it has arrived anywhere."""
+        self._drained = False
+        """Whether the battery was found to last less long, and nothing has followed yet."""
+        self._home_at_s: float | None = None
+        """When it has to fly home, if it finds nothing to do until then."""
+
+    # -- from without ------------------------------------------------------------------
+
+    def begin(self, now_s: float) -> None:
+        """The vehicle takes targets: as in a plain mission, or on to an earlier life's base."""
+        me, claim = self._mission_view.me, self._replica.claims.get(self._uav)
+        if me is not None:
+            self._sortie.begin(me, self._mission_view.mission_s(now_s))
+        visits = claim is not None and claim.stage in (BaseStage.APPROACHING, BaseStage.WAITING)
+        if not (visits and self._machine.state is AgentState.PREPARING and self._in_field):
+            super().begin(now_s)
+            return
+        self._machine.take(Trigger.VEHICLE_READY)
+        self._become_free(self._mission_view.mission_s(now_s))
+        if claim is None or not self._visits.resume(claim, now_s):
+            self._say_idle()
+
+    def recall(self, claim: Claim) -> None:
+        """An earlier life of this agent claimed so: what it says of the battery."""
+        self._sortie.recall(claim.sortie_end_s)
+
+    def stand(self, now_s: float) -> bool:
+        """Whether the vehicle stands at a base by its last claim: stay there, then."""
+        return self._flights.problem is not None and self._visits.stand(now_s)
+
+    def zones_changed(self) -> bool:
+        """Whether other zones are in force than when this was last asked."""
+        return self._flights.zones_changed()
+
+    @property
+    def stands_at(self) -> str | None:
+        """The base on whose ground the vehicle is."""
+        return self._visits.stands_at
+
+    def way_home(self) -> HomeFlight | None:
+        """From where the UAV is to the nearest base or its own start; None in a plain mission."""
+        name = self._visits.stands_at
+        base = None if name is None else self._flights.base(name)
+        if base is None:
+            return self._flights.way_home()
+        return HomeFlight((), self._mission_view.in_layer(base.position_enu_m), base.id, 0.0)
+
+    def arrive(self, leg: int, now_s: float) -> None:
+        """The vehicle is where that leg ends."""
+        problem, state = self._flights.problem, self._machine.state
+        if problem is None:
+            super().arrive(leg, now_s)
+            return
+        if leg != self._flights.leg:
+            return
+        self._departed_from = None
+        task = self._task()
+        if state is AgentState.FLYING_TO_BASE:
+            self._visits.arrive(now_s)
+        elif state is AgentState.SERVING and task is not None:
+            self._end_line(task, now_s)
+        elif task is not None and self._machine.take(Trigger.ARRIVED):
+            self._await_opening(task, now_s)
+
+    def touch_down(self, leg: int, now_s: float) -> None:
+        """The vehicle stands at the base where it was to land."""
+        self._visits.touch_down(leg, now_s)
+
+    def swapped(self, leg: int, now_s: float) -> None:
+        """The vehicle has a full battery."""
+        self._visits.swapped(leg, now_s)
+
+    def refuse(self, leg: int, reason: str, now_s: float) -> None:
+        """The vehicle will not fly that leg, or not land: leave its aim alone for a while."""
+        if leg != self._flights.leg:
+            return
+        claim, from_base, self._departed_from = self.claim, self._departed_from, None
+        base = None if from_base is None else self._flights.base(from_base)
+        visits = self._machine.state in VISITS_BASE
+        if visits and claim is not None and claim.base is not None:
+            self._refused_bases.add(claim.base, now_s)
+        if base is not None:
+            if claim is not None and claim.task is not None:
+                self._refused.add(claim.task, now_s)
+            self._become_free(self._mission_view.mission_s(now_s))
+            self._visits.stay(base, now_s)
+        elif visits:
+            self._visits.break_off(f"vehicle refused: {reason}", now_s)
+        else:
+            super().refuse(leg, reason, now_s)
+
+    def leaves_refused(self, now_s: float) -> bool:
+        """Whether, being idle, it leaves a task or base alone that its vehicle has refused."""
+        return super().leaves_refused(now_s) or bool(self._refused_bases.left_alone(now_s))
+
+    def measure(self, now_s: float) -> bool:
+        """The vehicle has told its charge: whether anything may follow from that."""
+        me, telemetry = self._mission_view.me, self._mission_view.telemetry
+        if me is None or telemetry is None or self._flights.problem is None:
+            return False
+        if self._machine.state in AT_BASE:
+            return False
+        mission_s = self._mission_view.mission_s(now_s)
+        if self._mission_view.running:
+            self._drained |= self._sortie.measure(me, telemetry.battery_frac, mission_s)
+        return self._drained
+
+    def advance_in_field(self, now_s: float) -> None:
+        """What follows from constraints and the time, in a running mission, before `advance`."""
+        if self._in_field:
+            self._visits.advance(now_s)
+            self._depart_if_due(now_s)
+            self._begin_if_due(now_s)
+            self._give_up_what_is_late(now_s)
+            if self._drained:
+                self._drain(now_s)
+
+    def next_deadline_s(self) -> float | None:
+        """When `advance` or `spent` will next have something to do."""
+        waits = self._machine.state in WITHOUT_AIM | {AgentState.ABOVE_BASE}
+        home_at_s = self._home_at_s if waits else None
+        return earliest(super().next_deadline_s(), home_at_s, self._visits.next_deadline_s())
+
+    # -- deciding ------------------------------------------------------------------------
+
+    def _decide_in_field(self, now_s: float) -> None:
+        problem, epoch = self._flights.problem, self._replica.epoch
+        turn = self._field_turn(self._free.since_s, now_s)
+        if problem is None or epoch is None or turn is None:
+            return
+        rule = self._field_rule(epoch)
+        if rule is None:
+            self._stay_idle(now_s)
+            return
+        decision = decide_in_field(problem, self._mission_view.board, rule, turn)
+        if decision is None or decision.base in self._refused_bases.left_alone(now_s):
+            self._stay_idle(now_s)
+        elif decision.task is not None:
+            self._take_task(problem, epoch, turn, decision, now_s)
+        elif decision.base is not None:
+            self._take_base(problem, epoch, decision, now_s)
+
+    def _divert_in_field(self, now_s: float) -> None:
+        problem, epoch, claim = self._flights.problem, self._replica.epoch, self.claim
+        turn = self._field_turn(self._mission_view.mission_s(now_s), now_s)
+        if problem is None or epoch is None or claim is None or turn is None:
+            return
+        rule = self._field_rule(epoch)
+        if rule is None or turn.awaited:
+            return
+        decision = divert_in_field(problem, self._mission_view.board, rule, turn)
+        if decision is not None and decision.task is not None:
+            self._become_free(turn.now_s)
+            self._take_task(problem, epoch, turn, decision, now_s, left=claim.task)
+
+    def _field_turn(self, free_since_s: float, now_s: float) -> DecisionTurn | None:
+        turn = self._turn(free_since_s, now_s)
+        if turn is None:
+            return None
+        return replace(
+            turn,
+            sortie_end_s=self._sortie.end_s,
+            landed_at=self._visits.stands_at,
+            parked=self._visits.stands_at is not None and self._visits.is_parked,
+            blocking=self._visits.blocking(),
+        )
+
+    def _field_rule(self, epoch: PlanEpoch) -> FieldRule | None:
+        """The rule in force; None, and told once, if it is not known."""
+        rule = field_rule_of(epoch.rule, epoch.routes)
+        if rule is None and self._rule_basis != epoch.rule:
+            self._rule_basis = epoch.rule
+            self._announcer.explain(f"cannot decide by rule {epoch.rule}")
+            self._log("unknown rule", rule=epoch.rule)
+        return rule
+
+    def _take_task(
+        self,
+        problem: FieldProblem,
+        epoch: PlanEpoch,
+        turn: DecisionTurn,
+        decision: FieldTurnDecision,
+        now_s: float,
+        left: str | None = None,
+    ) -> None:
+        task = self._replica.board[str(decision.task)]
+        rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
+        standing = self._visits.claim if self._visits.stands_at is not None else None
+        self._machine.take(Trigger.DECIDED if left is None else Trigger.DIVERTED)
+        self._free.retry_at_s, self._free.adrift, self._diversion_due = None, False, False
+        self._attempt = TaskAttempt(held_at_s=now_s + self._timing.objection_window_s)
+        ends_s = decision.sortie_end_s
+        claim = Claim(
+            ClaimPhase.PROPOSED,
+            task.task,
+            self._free.since_s,
+            rank,
+            decision.end_s,
+            sortie_end_s=None if math.isinf(ends_s) else ends_s,
+            reversed=decision.reversed if task.path_enu_m else None,
+        )
+        told = self._choices.made_in_field(turn, epoch, decision, claim, left)
+        if left is not None:
+            turns: dict[str, object] = {"task": left, "for": task.task}
+            self._log("turns aside", **turns, **self._choices.label)
+        if standing is not None and standing.base is not None:
+            self._attempt.departs_at_s = now_s + max(0.0, decision.depart_s - turn.now_s)
+            claim = replace(claim, base=standing.base, stage=standing.stage)
+            claim = replace(claim, departs_s=decision.depart_s)
+        if standing is None or decision.depart_s <= turn.now_s + TOLERANCE_S:
+            if not self._fly_to_task(task, claim, now_s, idled=self._free.found_nothing):
+                return
+        else:
+            self._announcer.explain(f"takes off from base {standing.base} later")
+            self._say(claim)
+        scores = {"score": decision.score, "second_score": decision.second_score}
+        self._note("decided", task.task, **scores, completion_s=decision.end_s)
+        self._actions.append(told)
+
+    def _take_base(
+        self, problem: FieldProblem, epoch: PlanEpoch, decision: FieldTurnDecision, now_s: float
+    ) -> None:
+        base = str(decision.base)
+        way = self._flights.way_to_base(base)
+        if way is None:
+            self._stay_idle(now_s)
+            return
+        rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
+        times_s = decision.arrive_s, decision.end_s
+        self._visit_base(way, base, rank, *times_s, now_s)
+
+    def _visit_base(
+        self, way: Way, base: str, rank: int, arrives_s: float, ready_s: float, now_s: float
+    ) -> None:
+        since_s = self._free.since_s
+        self._leave_ground(now_s)
+        self._become_free(since_s)
+        self._free.to_decide = False
+        self._visits.set_off(way, base, since_s, rank, arrives_s, ready_s, now_s)
+
+    def _visit_over(self, since_s: float, adrift: bool) -> None:
+        self._become_free(since_s, adrift=adrift)
+
+    # -- with a task -----------------------------------------------------------------------
+
+    def _order_to(self, task: TaskEntry, *, idled: bool = False) -> None:
+        """Fly to the task of an earlier life's claim."""
+        claim = self.claim
+        if self._flights.problem is None or claim is None:
+            super()._order_to(task, idled=idled)
+            return
+        way = self._flights.way_to_task(task.task, backwards=bool(claim.reversed))
+        if way is not None:
+            self._fly(way, task, claim, idled=idled)
+        else:  # found at once by `advance`
+            self._attempt.too_late_at_s = -math.inf
+
+    def _fly_to_task(
+        self, task: TaskEntry, claim: Claim, now_s: float, *, idled: bool = False
+    ) -> bool:
+        """Take off if need be, and fly there; say the claim as it is then. False: no way."""
+        way = self._flights.way_to_task(task.task, backwards=bool(claim.reversed))
+        if way is None:
+            self._release("zones leave no way", now_s)
+            return False
+        if self._visits.stands_at is not None:
+            self._machine.take(Trigger.DEPARTED)
+            self._leave_ground(now_s)
+            self._announcer.explain("")
+        claim = replace(claim, base=None, stage=None, departs_s=None)
+        claim = replace(claim, sortie_end_s=self._sortie.told_s)
+        self._attempt.departs_at_s = None
+        self._attempt.too_late_at_s = self._limits.too_late_at_s(task, claim, now_s)
+        self._fly(way, task, claim, idled=idled)
+        self._say(claim)
+        return True
+
+    def _fly(self, way: Way, task: TaskEntry, claim: Claim, *, idled: bool = False) -> None:
+        line_s = self._flights.line_s(task.task, backwards=bool(claim.reversed))
+        stay_s = task.service_s if line_s == 0.0 else 0.0
+        attempt = self._attempt_at(task.task)
+        self._flights.along(way, task, attempt, stay_s, idled=idled)
+
+    def _leave_ground(self, now_s: float) -> None:
+        me = self._mission_view.me
+        self._departed_from = self._visits.leave_ground()
+        if self._departed_from is not None and me is not None:
+            self._sortie.depart(me, self._mission_view.mission_s(now_s))
+
+    def _depart_if_due(self, now_s: float) -> None:
+        departs_at_s, task, claim = self._attempt.departs_at_s, self._task(), self.claim
+        if departs_at_s is None or departs_at_s > now_s or task is None or claim is None:
+            return
+        early_s = (claim.departs_s or 0.0) - self._mission_view.mission_s(now_s)
+        if early_s > TOLERANCE_S:  # the mission clock was put back
+            self._attempt.departs_at_s = now_s + early_s
+        elif self._lost() is None:
+            self._fly_to_task(task, claim, now_s)
+
+    def _await_opening(self, task: TaskEntry, now_s: float) -> None:
+        """The UAV is where its work begins: wait until it may, unless it is too late."""
+        claim, mission_s = self.claim, self._mission_view.mission_s(now_s)
+        if claim is None:
+            return
+        begins_s = max(mission_s, task.opens_s)
+        self._mission_view.arrive(ends_of(task, backwards=bool(claim.reversed))[0])
+        self._attempt.too_late_at_s = None
+        if begins_s > self._limits.latest_begin_s(task, claim) + TOLERANCE_S:
+            self._release("came too late", now_s)
+            return
+        self._attempt.begins_at_s = now_s + (begins_s - mission_s)
+        self._begin_if_due(now_s)
+
+    def _begin_if_due(self, now_s: float) -> None:
+        begins_at_s, task, claim = self._attempt.begins_at_s, self._task(), self.claim
+        if begins_at_s is None or begins_at_s > now_s or task is None or claim is None:
+            return
+        early_s = task.opens_s - self._mission_view.mission_s(now_s)
+        if early_s > TOLERANCE_S:  # the mission clock was put back
+            self._attempt.begins_at_s = now_s + early_s
+            return
+        self._attempt.begins_at_s = None
+        if task.path_enu_m:
+            attempt, backwards = self._attempt_at(task.task), bool(claim.reversed)
+            self._flights.along_line(task, attempt, backwards=backwards)
+        else:
+            self._attempt.served_at_s = now_s + task.service_s
+
+    def _end_line(self, task: TaskEntry, now_s: float) -> None:
+        """The UAV has flown the line from end to end."""
+        claim = self.claim
+        if claim is None or not task.path_enu_m or self._attempt.served_at_s is not None:
+            return
+        self._mission_view.arrive(ends_of(task, backwards=bool(claim.reversed))[1])
+        self._attempt.served_at_s = now_s + task.service_s
+
+    def _give_up_what_is_late(self, now_s: float) -> None:
+        late_s = self._attempt.too_late_at_s
+        if late_s is not None and late_s <= now_s and self._task() is not None:
+            self._release("too late to be there in time", now_s)
+
+    def _drain(self, now_s: float) -> None:
+        """The battery lasts less long than was known: give up what can't be done on it."""
+        self._drained = False
+        task, claim, state = self._task(), self.claim, self._machine.state
+        if claim is None or task is None or not self._in_field:
+            return
+        if state not in (AgentState.FLYING, AgentState.SERVING):
+            return
+        if not self._limits.lasts(task, claim):
+            self._release("its battery does not last", now_s)
+        elif state is AgentState.FLYING:
+            self._attempt.too_late_at_s = self._limits.too_late_at_s(task, claim, now_s)
+
+    # -- zones -------------------------------------------------------------------------------
+
+    def reroute(self, now_s: float) -> None:
+        """Zones have changed: new ways at once, and nothing that has none."""
+        state, task, claim = self._machine.state, self._task(), self.claim
+        if self._flights.problem is None or claim is None:
+            return
+        self._home_at_s = None
+        if state in (AgentState.FLYING_TO_BASE, AgentState.ABOVE_BASE):
+            self._visits.reroute(now_s)
+        elif state is AgentState.FLYING and task is not None:
+            self._reroute_to(task, claim, now_s)
+        elif state is AgentState.SERVING and task is not None:
+            line_s = self._flights.line_s(task.task, backwards=bool(claim.reversed))
+            if math.isinf(line_s) or self._flights.way_out() is not None:
+                self._release("a zone lies over it", now_s)
+        if self._machine.state is AgentState.IDLE:
+            self._free.adrift, self._free.to_decide = True, True
+
+    def _reroute_to(self, task: TaskEntry, claim: Claim, now_s: float) -> None:
+        way = self._flights.way_to_task(task.task, backwards=bool(claim.reversed))
+        mission_s = self._mission_view.mission_s(now_s)
+        if way is None:
+            self._release("zones leave no way", now_s)
+            return
+        begins_s = max(mission_s + way.duration_s, task.opens_s)
+        line_s = self._flights.line_s(task.task, backwards=bool(claim.reversed))
+        if not begins_s <= self._limits.latest_begin_s(task, claim) + TOLERANCE_S:
+            self._release("zones make the way too long", now_s)
+            return
+        self._attempt.too_late_at_s = self._limits.too_late_at_s(task, claim, now_s)
+        self._fly(way, task, claim)
+        self._say(replace(claim, completion_s=begins_s + line_s + task.service_s))
+
+    # -- without a task ------------------------------------------------------------------------
+
+    def _situated(self, claim: Claim) -> Claim:
+        return claim if self._flights.problem is None else self._visits.situated(claim)
+
+    def _stay_idle(self, now_s: float) -> None:
+        if self._machine.state is AgentState.READY_ON_GROUND:
+            self._free.adrift = False
+        super()._stay_idle(now_s)
+        if self._flights.problem is None:
+            return
+        if not self._free.awaits_peers:
+            self._visits.park()
+        until_s = self._refused_bases.left_alone(now_s).values()
+        self._free.retry_at_s = earliest(self._free.retry_at_s, *until_s)
+
+    def head_home_in_time(self, now_s: float) -> None:
+        """Who has found nothing to do flies to the nearest base before its battery is used up."""
+        if not self._in_field:
+            return
+        self._home_at_s = self._limits.leaves_at_s(self.stands_at is not None, now_s)
+        if self._home_at_s is None or self._home_at_s > now_s:
+            return
+        home, epoch, problem = self._flights.way_home(), self._replica.epoch, self._flights.problem
+        if self._machine.state is not AgentState.IDLE or home is None or home.base is None:
+            return
+        base, way = self._flights.base(home.base), self._flights.way_to_base(home.base)
+        if base is None or way is None or epoch is None or problem is None:
+            return
+        if home.base not in self._refused_bases.left_alone(now_s):
+            arrives_s = self._mission_view.mission_s(now_s) + way.duration_s
+            rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
+            ready_s = arrives_s + base.swap_s
+            self._visit_base(way, home.base, rank, arrives_s, ready_s, now_s)
+            self._home_at_s = self._limits.leaves_at_s(self.stands_at is not None, now_s)
+
+    def spent(self, now_s: float) -> str | None:
+        """Why the UAV has to fly home for good: its battery; None if it need not."""
+        if self._flights.problem is None:
+            return None
+        if self._machine.state in PAUSED_BY_OPERATOR:  # nothing else looks at the time there
+            self._home_at_s = self._limits.leaves_at_s(self.stands_at is not None, now_s)
+        if self._home_at_s is None or self._home_at_s > now_s:
+            return None
+        return "its battery is about to be used up"
+
+    # -- pieces ----------------------------------------------------------------------------------
+
+    @property
+    def _in_field(self) -> bool:
+        """Whether it decides under constraints, in a running mission."""
+        return self._flights.problem is not None and self._mission_view.running

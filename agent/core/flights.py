@@ -1,0 +1,175 @@
+"""Where one UAV's vehicle is sent, and which way: straight, or round what is to be kept out of.
+
+Of a plain mission all ways are straight. With the field's constraints they are those by which
+decisions are made, so a UAV flies what it reckoned with. Leaves out: why it flies there.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from agent.core.context import AgentContext, AgentPart
+from agent.core.interface import GoTo, Swap
+from swarm.allocation.field import FieldProblem
+from swarm.allocation.field.ways import Way, base_node, task_nodes, way_home, way_to
+from swarm.model import TaskId, UavId
+from swarm.protocol.field_messages import BaseSpec, ZoneSpec
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import TaskEntry
+from swarm.protocol.operator_commands import zones_in_force
+
+
+@dataclass(frozen=True, slots=True)
+class HomeFlight:
+    """The way home of a UAV, to the nearest base or its own start."""
+
+    via_enu_m: tuple[Point, ...]
+    """Corners on the way [m; mission origin, heights included]."""
+    target_enu_m: Point
+    """Above where it lands [m; alike]."""
+    base: str | None
+    """Which base that is; None: its own start."""
+    duration_s: float
+
+
+class Flights(AgentPart):
+    """Orders one UAV's vehicle from place to place."""
+
+    def __init__(self, context: AgentContext) -> None:
+        super().__init__(context)
+        self.leg = 0
+        """Number of the last order to fly somewhere; what the vehicle says of others is late."""
+        self._zones: tuple[ZoneSpec, ...] = ()
+        self._home: HomeFlight | None = None
+        self._home_from: object = None
+        """Place and problem of that way home."""
+
+    # -- what is known of the field -------------------------------------------------------
+
+    @property
+    def problem(self) -> FieldProblem | None:
+        """Of a mission with the field's constraints in which this UAV is; None of a plain one."""
+        problem = self._mission_view.board.field_problem
+        return problem if problem is not None and self._uav in problem.uav_ids else None
+
+    def base(self, name: str) -> BaseSpec | None:
+        """That base as the brief has it; None: there is none."""
+        brief = self._replica.brief
+        bases = () if brief is None else brief.bases
+        return next((base for base in bases if base.id == name), None)
+
+    def zones_changed(self) -> bool:
+        """Whether other zones are in force than when this was last asked."""
+        before, self._zones = self._zones, zones_in_force(self._replica)
+        return before != self._zones
+
+    def nodes(self, task: str, *, backwards: bool) -> tuple[int, int] | None:
+        """Nodes where that task begins and ends in that direction; None: the problem lacks it."""
+        problem = self.problem
+        if problem is None or task not in problem.task_ids:
+            return None
+        column = problem.task_ids.index(TaskId(task))
+        return task_nodes(problem, column, backwards=backwards)
+
+    def line_s(self, task: str, *, backwards: bool) -> float:
+        """Time along that task's line [s]; 0 of a place."""
+        problem = self.problem
+        if problem is None or task not in problem.task_ids:
+            return 0.0
+        column = problem.task_ids.index(TaskId(task))
+        return float(problem.line_s[problem.kind[self._row(problem)], column, int(backwards)])
+
+    def home_s(self, node: int) -> float:
+        """Time home from a node of the problem [s]."""
+        problem = self.problem
+        return 0.0 if problem is None else float(problem.home_s[self._row(problem), node])
+
+    def way_to_task(self, task: str, *, backwards: bool) -> Way | None:
+        """From where the UAV is to where that task begins; None: there is none."""
+        nodes = self.nodes(task, backwards=backwards)
+        return None if nodes is None else self._way(nodes[0])
+
+    def way_to_base(self, base: str) -> Way | None:
+        """From where the UAV is to above that base; None: there is none."""
+        problem = self.problem
+        if problem is None or base not in problem.base_ids:
+            return None
+        return self._way(base_node(problem, base))
+
+    def way_home(self) -> HomeFlight | None:
+        """From where the UAV is; None where that is not known, or there is none."""
+        problem, place_enu_m = self.problem, self._mission_view.place_enu_m
+        if problem is None or place_enu_m is None:
+            return None
+        if self._home_from != (place_enu_m, id(problem)):
+            way = way_home(problem, self._row(problem), place_enu_m)
+            self._home_from = place_enu_m, id(problem)
+            self._home = (
+                None
+                if way is None
+                else HomeFlight(way.via_enu_m, way.end_enu_m, way.base, way.duration_s)
+            )
+        return self._home
+
+    def way_out(self) -> Point | None:
+        """Where the UAV leaves the zone that it is in, in its layer; None: it is in none."""
+        problem, place_enu_m = self.problem, self._mission_view.place_enu_m
+        if problem is None or problem.network is None or place_enu_m is None:
+            return None
+        out_m = problem.network.way_out_m(self._row(problem), place_enu_m)
+        return None if out_m is None else self._mission_view.in_layer(out_m)
+
+    def _way(self, node: int) -> Way | None:
+        problem, place_enu_m = self.problem, self._mission_view.place_enu_m
+        if problem is None or place_enu_m is None:
+            return None
+        return way_to(problem, self._row(problem), place_enu_m, node)
+
+    def _row(self, problem: FieldProblem) -> int:
+        return problem.uav_ids.index(UavId(self._uav))
+
+    # -- orders ---------------------------------------------------------------------------
+
+    def to_task(self, task: TaskEntry, attempt: int, *, idled: bool = False) -> None:
+        """Fly straight to a task, and stay as long as its service takes."""
+        self.leg += 1
+        place_enu_m = self._mission_view.in_layer(task.position_enu_m)
+        self._order(GoTo(self.leg, place_enu_m, task.service_s, idled, task.task, attempt))
+
+    def along(
+        self, way: Way, task: TaskEntry | None, attempt: int, stay_s: float, *, idled: bool = False
+    ) -> None:
+        """Fly that way, to a task or above a base."""
+        self.leg += 1
+        name = None if task is None else task.task
+        via_enu_m = way.via_enu_m
+        self._order(
+            GoTo(self.leg, way.end_enu_m, stay_s, idled, name, attempt, via_enu_m=via_enu_m)
+        )
+
+    def along_line(self, task: TaskEntry, attempt: int, *, backwards: bool) -> Point:
+        """Fly the line of a task from end to end; gives where that is, without the layer."""
+        points = task.path_enu_m[::-1] if backwards else task.path_enu_m
+        flown = [self._flown(task, point) for point in points]
+        self.leg += 1
+        via_enu_m = tuple(flown[1:-1])
+        order = GoTo(self.leg, flown[-1], task.service_s, False, task.task, attempt, via_enu_m)
+        self._order(order)
+        return points[-1]
+
+    def _flown(self, task: TaskEntry, point: Point) -> Point:
+        if task.height_m is not None:
+            return point[0], point[1], task.height_m
+        return self._mission_view.in_layer(point)
+
+    def stop(self) -> None:
+        """Hover where the vehicle is; in a zone, by the shortest way out of it."""
+        telemetry = self._mission_view.telemetry
+        if telemetry is not None:
+            self.leg += 1
+            self._order(GoTo(self.leg, self.way_out() or telemetry.position_enu_m))
+
+    def swap(self, base: BaseSpec) -> None:
+        """Land at a base, and get another battery."""
+        self.leg += 1
+        self._order(Swap(self.leg, base.position_enu_m))

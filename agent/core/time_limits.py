@@ -1,0 +1,86 @@
+"""By when one UAV must have begun what it is about to do, and by when it must head home.
+
+Windows, due times and what is left of the battery, worked out from the same tables as decisions.
+Leaves out: what follows when it is too late (agent.core.field_tasking).
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Final
+
+from agent.core.context import AgentContext, AgentPart
+from agent.core.energy import TOLERANCE_S, SortieClock
+from agent.core.flights import Flights
+from agent.core.states import PAUSED_BY_OPERATOR, AgentState
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import TaskEntry
+from swarm.protocol.uav_messages import Claim
+
+WITHOUT_AIM: Final = PAUSED_BY_OPERATOR | {AgentState.IDLE}
+"""In the air, it stands by nothing there: its way home is all that its battery is for."""
+
+
+def ends_of(task: TaskEntry, *, backwards: bool) -> tuple[Point, Point]:
+    """Where a task begins and ends in that direction, as heights are given; a place twice."""
+    points = task.path_enu_m[::-1] if backwards else task.path_enu_m
+    first, last = (points[0], points[-1]) if points else (task.position_enu_m, task.position_enu_m)
+    if task.height_m is None:
+        return first, last
+    return (*first[:2], task.height_m), (*last[:2], task.height_m)
+
+
+class TimeLimits(AgentPart):
+    """What one UAV's time is limited by.
+
+    Args:
+        flights: knows the ways and how long they take.
+        sortie: knows how long the UAV may stay in the air.
+    """
+
+    def __init__(self, context: AgentContext, flights: Flights, sortie: SortieClock) -> None:
+        super().__init__(context)
+        self._flights = flights
+        self._sortie = sortie
+
+    def latest_begin_s(self, task: TaskEntry, claim: Claim) -> float:
+        """Mission time by which the work must have begun: window, due time and battery [s]."""
+        backwards = bool(claim.reversed)
+        takes_s = self._flights.line_s(task.task, backwards=backwards) + task.service_s
+        ends_s = self._sortie.end_s - self._home_s(task, claim)
+        if task.due_s is not None:
+            ends_s = min(ends_s, task.due_s)
+        closes_s = math.inf if task.closes_s is None else task.closes_s
+        return min(closes_s, ends_s - takes_s)
+
+    def too_late_at_s(self, task: TaskEntry, claim: Claim, now_s: float) -> float | None:
+        """When that is on the own clock, the tolerance passed; None: never."""
+        latest_s = self.latest_begin_s(task, claim) - self._mission_view.mission_s(now_s)
+        return None if math.isinf(latest_s) else now_s + latest_s + 2.0 * TOLERANCE_S
+
+    def lasts(self, task: TaskEntry, claim: Claim) -> bool:
+        """Whether the battery lasts until the UAV is home from what it claims."""
+        home_at_s = claim.completion_s + self._home_s(task, claim)
+        return home_at_s <= self._sortie.end_s + TOLERANCE_S
+
+    def leaves_at_s(self, stands: bool, now_s: float) -> float | None:
+        """When the UAV has to head home from where it is, on the own clock; None: never.
+
+        Only who stands by nothing in the air has to: other ways home are reckoned with already.
+        Above a base it has nowhere to go, and lands when its sortie ends, slot or not.
+        """
+        end_s, state = self._sortie.end_s, self._machine.state
+        if math.isinf(end_s) or not self._mission_view.running or stands:
+            return None
+        end_at_s = now_s + end_s - self._mission_view.mission_s(now_s)
+        if state is AgentState.ABOVE_BASE:
+            return end_at_s
+        if state not in WITHOUT_AIM:
+            return None
+        home = self._flights.way_home()
+        return None if home is None else end_at_s - home.duration_s - self._timing.patience_s
+
+    def _home_s(self, task: TaskEntry, claim: Claim) -> float:
+        """From where the task ends [s]."""
+        nodes = self._flights.nodes(task.task, backwards=bool(claim.reversed))
+        return 0.0 if nodes is None else self._flights.home_s(nodes[1])

@@ -1,0 +1,18 @@
+"""Decisions under the field's constraints as a test tells them."""
+
+from __future__ import annotations
+
+import pytest
+
+from agent.core import field_tasking
+from tests.support.field_agent import Script
+
+
+@pytest.fixture
+def script(monkeypatch: pytest.MonkeyPatch) -> Script:
+    """What the agents of this test decide next, in order."""
+    told = Script()
+    monkeypatch.setattr(field_tasking, "decide_in_field", told.decide)
+    monkeypatch.setattr(field_tasking, "divert_in_field", lambda *_: None)
+    monkeypatch.setattr(field_tasking, "field_rule_of", lambda name, routes: (name, routes))
+    return told

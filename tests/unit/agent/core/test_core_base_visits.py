@@ -1,0 +1,453 @@
+"""A visit to a base, from the decision to the departure, and whatever comes between."""
+
+from __future__ import annotations
+
+import pytest
+
+from agent.core.interface import GoTo, Refused, Return, Swap
+from agent.core.states import AgentState
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import CommandKind, MissionPhase
+from swarm.protocol.uav_messages import BaseStage, ClaimPhase, StatusPhase
+from tests.support.builders import entry, epoch
+from tests.support.field_agent import (
+    BUDGET_S,
+    FAR_BASE,
+    SWAP_S,
+    FieldAgent,
+    Script,
+    square,
+    visiting,
+)
+from tests.support.lone_agent import ABOVE_START, claims, finishes, orders, statuses
+
+ABOVE_BASE = (50.0, 0.0, 10.0)
+
+
+def inside(place_enu_m: Point, east_m: float, north_m: float, half_m: float = 5.0) -> bool:
+    """Whether a place is in the zone of `square`."""
+    return max(abs(place_enu_m[0] - east_m), abs(place_enu_m[1] - north_m)) < half_m
+
+
+def on_its_way(script: Script, *others: str, **more: object) -> FieldAgent:
+    """It has just decided to fly to the base, at mission time 0."""
+    agent = FieldAgent(*others, **more)  # type: ignore[arg-type]  # each test names real ones
+    agent.fly_to(entry("t0", 100.0))
+    script.items = ["base:b0"]
+    agent.start_mission()
+    assert agent.state is AgentState.FLYING_TO_BASE
+    return agent
+
+
+def swapping(script: Script, *others: str, **more: object) -> FieldAgent:
+    """It has touched down at 50 s."""
+    agent = on_its_way(script, *others, **more)
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.touch_down(50.0)
+    assert agent.state is AgentState.SWAPPING
+    return agent
+
+
+def test_it_flies_to_the_base_that_it_decided_on_and_claims_it(script: Script) -> None:
+    agent = on_its_way(script)
+
+    claim = agent.claim
+    assert claim is not None
+    assert (claim.phase, claim.task, claim.base) == (ClaimPhase.PROPOSED, None, "b0")
+    assert (claim.stage, claim.arrives_s) == (BaseStage.APPROACHING, 50.0)
+    assert (claim.completion_s, claim.sortie_end_s) == (50.0 + SWAP_S, BUDGET_S)
+    assert agent.flight.position_enu_m == ABOVE_BASE
+    assert agent.core.phase is StatusPhase.FLYING
+    agent.run_until(1.0)
+    assert agent.phase is ClaimPhase.HELD
+
+
+def test_it_lands_at_once_where_nobody_else_needs_the_slot(script: Script) -> None:
+    agent = on_its_way(script)
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+
+    assert agent.landing.position_enu_m == (50.0, 0.0, 0.0)
+    assert (agent.state, agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+    assert agent.claim is not None
+    assert agent.claim.completion_s == 50.0 + SWAP_S
+    agent.touch_down(51.0)
+    assert agent.claim.completion_s == 51.0 + SWAP_S
+    assert agent.claim.sortie_end_s is None
+
+
+def test_a_full_battery_makes_it_free_and_with_nothing_to_do_it_leaves_the_slot(
+    script: Script,
+) -> None:
+    agent = swapping(script)
+
+    agent.get_full(70.0)
+
+    assert script.turns[-1].landed_at == "b0"
+    assert not script.turns[-1].parked
+    assert agent.state is AgentState.READY_ON_GROUND
+    assert (agent.phase, agent.stage) == (ClaimPhase.IDLE, BaseStage.PARKED)
+    assert agent.core.phase is StatusPhase.IDLE
+    assert not isinstance(agent.last_order, GoTo)
+
+
+def test_it_takes_off_for_its_next_task_with_a_new_sortie(script: Script) -> None:
+    agent = swapping(script)
+    script.items = ["t0"]
+
+    agent.get_full(70.0)
+
+    assert agent.state is AgentState.FLYING
+    assert agent.flight.position_enu_m == (100.0, 0.0, 10.0)
+    claim = agent.claim
+    assert claim is not None
+    assert (claim.task, claim.base, claim.stage, claim.departs_s) == ("t0", None, None, None)
+    assert (claim.completion_s, claim.sortie_end_s) == (120.0, 70.0 + BUDGET_S)
+
+
+def test_it_holds_its_slot_until_it_has_to_depart(script: Script) -> None:
+    agent = FieldAgent()
+    agent.fly_to(entry("t0", 100.0, opens_s=200.0))
+    script.items = ["base:b0", "t0"]
+    agent.start_mission()
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.touch_down(50.0)
+    agent.get_full(70.0)
+
+    claim = agent.claim
+    assert claim is not None
+    assert agent.state is AgentState.DEPARTING
+    assert (claim.task, claim.base, claim.stage) == ("t0", "b0", BaseStage.LANDED)
+    assert claim.departs_s == 150.0
+    assert isinstance(agent.last_order, Swap)
+    agent.run_until(149.9)
+    assert agent.state is AgentState.DEPARTING
+    assert agent.phase is ClaimPhase.HELD
+    agent.run_until(150.0)
+    assert agent.state is AgentState.FLYING
+    assert agent.flight.position_enu_m == (100.0, 0.0, 10.0)
+    claim = agent.claim
+    assert claim is not None
+    assert (claim.phase, claim.task, claim.base) == (ClaimPhase.HELD, "t0", None)
+    assert claim.sortie_end_s == 150.0 + BUDGET_S
+
+
+def test_a_task_lost_before_take_off_leaves_it_on_the_ground(script: Script) -> None:
+    agent = FieldAgent()
+    agent.fly_to(entry("t0", 100.0, opens_s=200.0))
+    script.items = ["base:b0", "t0"]
+    agent.start_mission()
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.touch_down(50.0)
+    agent.get_full(70.0)
+
+    agent.post(entry("t0", 100.0, opens_s=200.0, withdrawn=True))
+
+    assert agent.state is AgentState.READY_ON_GROUND
+    assert (agent.phase, agent.stage) == (ClaimPhase.IDLE, BaseStage.PARKED)
+    assert not isinstance(agent.last_order, GoTo)
+
+
+def test_it_waits_above_a_base_whose_slot_is_held_and_lands_when_that_is_left(
+    script: Script,
+) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+
+    assert (agent.state, agent.stage) == (AgentState.ABOVE_BASE, BaseStage.WAITING)
+    assert agent.core.phase is StatusPhase.FLYING
+    agent.run_until(60.0)
+    assert agent.state is AgentState.ABOVE_BASE
+    agent.hear("u1", visiting(BaseStage.PARKED, 5.0), 61.0)
+    assert (agent.state, agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+    assert isinstance(agent.last_order, Swap)
+
+
+def test_of_two_that_wait_the_first_to_arrive_lands_first(script: Script) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.WAITING, 40.0))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.run_until(60.0)
+    assert agent.state is AgentState.ABOVE_BASE
+
+    agent.hear("u1", visiting(BaseStage.WAITING, 55.0), 61.0)
+
+    assert agent.state is AgentState.SWAPPING
+
+
+def test_a_claim_that_others_may_still_object_to_does_not_land(script: Script) -> None:
+    agent = FieldAgent(bases=[FAR_BASE])
+    agent.fly_to(entry("t0", 100.0))
+    agent.be_at((0.0, 299.9, 10.0), None)
+    script.items = ["base:b1"]
+    agent.start_mission()
+
+    agent.arrive(0.1)
+
+    if agent.stage is BaseStage.APPROACHING:  # no limit of slots needs no window
+        agent.run_until(1.0)
+    assert agent.state is AgentState.SWAPPING
+
+
+def test_a_base_with_a_dead_slot_holder_is_left_until_the_operator_says_it_is_ready(
+    script: Script,
+) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+
+    agent.lose("u1", 60.0)
+
+    assert agent.state is AgentState.IDLE
+    assert script.turns[-1].blocking == {"u1": "b0"}
+    script.items = ["base:b0"]
+    agent.vouched("u1", 70.0)
+    assert script.turns[-1].blocking == {}
+    agent.run_until(70.9)
+    agent.arrive(71.0)
+    assert agent.state is AgentState.SWAPPING
+
+
+def test_who_was_lost_on_its_way_blocks_nothing(script: Script) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.APPROACHING, 5.0))
+    agent.run_until(29.0)
+    agent.lose("u1", 30.0)
+    agent.arrive(50.0)
+
+    assert agent.state is AgentState.SWAPPING
+
+
+def test_without_a_slot_it_lands_for_good_when_its_battery_is_used_up(script: Script) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+
+    agent.run_until(BUDGET_S - 0.1)
+    assert agent.state is AgentState.ABOVE_BASE
+    agent.run_until(BUDGET_S)
+
+    assert agent.way_home.land
+    assert agent.way_home.via_enu_m == ABOVE_BASE
+    assert agent.way_home.path_enu_m == ()
+    assert agent.phase is ClaimPhase.OUT
+
+
+@pytest.mark.parametrize("above", [False, True])
+def test_a_base_that_a_zone_cuts_off_is_given_up(script: Script, above: bool) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.run_until(49.0)
+    agent.be_at(ABOVE_BASE if above else (40.0, 0.0, 10.0), None)
+    if above:
+        agent.arrive(50.0)
+
+    agent.drawn(square("new", 50.0, 0.0), 51.0)
+
+    # Out of the zone by the shortest way, or not into it.
+    assert agent.state is AgentState.IDLE
+    assert agent.flight.position_enu_m != ABOVE_BASE
+    assert not inside(agent.flight.position_enu_m, 50.0, 0.0)
+
+
+def test_a_vehicle_that_will_not_land_leaves_the_base_alone_for_a_while(script: Script) -> None:
+    agent = on_its_way(script)
+    agent.run_until(49.0)
+    agent.be_at(ABOVE_BASE, None)
+    agent.arrive(50.0)
+    script.items = ["base:b0"]
+
+    agent.happen(Refused(agent.landing, "no pad seen"), 51.0)
+
+    claim = agent.claim
+    assert claim is not None
+    assert agent.state is AgentState.IDLE
+    assert (claim.phase, claim.base, claim.sortie_end_s) == (ClaimPhase.IDLE, None, BUDGET_S)
+    script.items = ["base:b0"]
+    agent.run_until(51.0 + agent.timing.reconsider_s - 0.1)
+    assert agent.state is AgentState.IDLE
+    agent.run_until(51.0 + agent.timing.reconsider_s)
+    assert agent.state is AgentState.FLYING_TO_BASE
+
+
+def test_a_vehicle_that_will_not_take_off_stands_there_still(script: Script) -> None:
+    agent = swapping(script)
+    script.items = ["t0"]
+    agent.get_full(70.0)
+
+    agent.happen(Refused(agent.flight, "not armable"), 71.0)
+
+    assert (agent.state, agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+    assert isinstance(agent.last_order, Swap)
+    agent.get_full(72.0)
+    assert agent.state is AgentState.READY_ON_GROUND
+    assert script.turns[-1].excluded == {"t0"}
+
+
+def test_it_may_fly_from_base_to_base(script: Script) -> None:
+    agent = swapping(script, bases=[*FieldAgent().brief.bases, FAR_BASE])
+    script.items = ["base:b1"]
+
+    agent.get_full(70.0)
+
+    assert agent.state is AgentState.FLYING_TO_BASE
+    claim = agent.claim
+    assert claim is not None
+    assert (claim.base, claim.stage) == ("b1", BaseStage.APPROACHING)
+    assert claim.sortie_end_s == 70.0 + BUDGET_S
+
+
+# -- stopped and sent home -------------------------------------------------------------
+
+
+@pytest.mark.parametrize("above", [False, True])
+def test_held_in_the_air_it_gives_the_base_up_and_decides_anew_afterwards(
+    script: Script, above: bool
+) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.run_until(20.0)
+    if above:
+        agent.arrive(50.0)
+
+    agent.told(CommandKind.HOLD, 51.0)
+
+    claim = agent.claim
+    assert claim is not None
+    assert (claim.phase, claim.base, claim.sortie_end_s) == (ClaimPhase.PAUSED, None, BUDGET_S)
+    agent.told(CommandKind.RESUME, 60.0)
+    assert agent.state is AgentState.PREPARING
+
+
+def test_held_at_a_base_it_stays_there_and_goes_on_from_there(script: Script) -> None:
+    agent = swapping(script)
+
+    agent.told(CommandKind.HOLD, 55.0)
+
+    claim = agent.claim
+    assert claim is not None
+    assert (claim.phase, claim.base, claim.stage) == (ClaimPhase.PAUSED, "b0", BaseStage.LANDED)
+    agent.told(CommandKind.RESUME, 60.0)
+    assert agent.state is AgentState.SWAPPING
+    assert isinstance(agent.last_order, Swap)
+    agent.get_full(80.0)
+    assert agent.state is AgentState.READY_ON_GROUND
+
+
+def test_a_hold_long_enough_to_use_the_battery_up_ends_with_the_way_home(script: Script) -> None:
+    agent = on_its_way(script)
+    agent.be_at((20.0, 0.0, 10.0), None, 20.0)
+    agent.told(CommandKind.HOLD, 20.0)
+
+    # The own start is 20 m away, the base 30 m.
+    agent.run_until(BUDGET_S - 20.0 - agent.timing.patience_s - 0.1)
+    assert agent.state is AgentState.PAUSED
+    agent.run_until(BUDGET_S - 20.0)
+
+    assert agent.state is AgentState.RETURNING_VIA_START
+    assert agent.way_home.via_enu_m == ABOVE_START
+    assert not agent.way_home.land
+
+
+def test_at_the_end_of_the_mission_who_stands_at_a_base_is_home(script: Script) -> None:
+    agent = swapping(script)
+
+    agent.hear("coordinator", epoch("u0", phase=MissionPhase.ENDED, reason="over", number=2), 60.0)
+
+    assert agent.way_home == Return("over", False, ABOVE_BASE, land=True)
+    claim = agent.claim
+    assert claim is not None
+    assert (claim.phase, claim.stage) == (ClaimPhase.OUT, BaseStage.PARKED)
+    assert finishes(agent.log) == []
+
+
+# -- started again -----------------------------------------------------------------------
+
+
+def test_started_again_on_its_way_it_flies_on_to_the_base(script: Script) -> None:
+    agent = on_its_way(script)
+    agent.run_until(10.0)
+    life = agent.next_life()
+    assert life.state is AgentState.PREPARING
+    life.be_at((12.0, 0.0, 10.0), None)
+
+    life.happen_ready()
+
+    assert life.state is AgentState.FLYING_TO_BASE
+    assert life.flight.position_enu_m == ABOVE_BASE
+    claim = life.claim
+    assert claim is not None
+    assert (claim.phase, claim.base, claim.stage) == (ClaimPhase.HELD, "b0", BaseStage.APPROACHING)
+    assert claim.sortie_end_s == BUDGET_S
+
+
+def test_started_again_while_it_waits_it_keeps_its_place(script: Script) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.run_until(60.0)
+    life = agent.next_life()
+    life.see("u1")
+    life.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    life.be_at(ABOVE_BASE, None)
+    life.happen_ready()
+
+    life.arrive(63.0)
+
+    assert (life.state, life.stage) == (AgentState.ABOVE_BASE, BaseStage.WAITING)
+    assert life.claim is not None
+    assert life.claim.arrives_s == 50.0
+    life.hear("u1", visiting(BaseStage.PARKED, 5.0), 70.0)
+    assert life.state is AgentState.SWAPPING
+
+
+@pytest.mark.parametrize("full", [False, True])
+def test_started_again_on_the_ground_it_stays_there(script: Script, full: bool) -> None:
+    agent = swapping(script)
+    if full:
+        agent.get_full(70.0)
+    life = agent.next_life()
+
+    assert life.state is AgentState.SWAPPING
+    assert [type(order) for order in orders(life.log)] == [Swap]
+    assert life.stage is (BaseStage.PARKED if full else BaseStage.LANDED)
+    life.get_full(80.0)
+    assert life.state is AgentState.READY_ON_GROUND
+
+
+def test_started_again_before_it_departs_it_decides_anew_from_the_ground(script: Script) -> None:
+    agent = FieldAgent()
+    agent.fly_to(entry("t0", 100.0, opens_s=200.0))
+    script.items = ["base:b0", "t0"]
+    agent.start_mission()
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.touch_down(50.0)
+    agent.get_full(70.0)
+    life = agent.next_life()
+    assert life.state is AgentState.SWAPPING
+    script.items = ["t0"]
+
+    life.get_full(73.0)
+
+    assert life.state is AgentState.DEPARTING
+    assert life.task == "t0"
+
+
+def test_its_status_tells_of_the_visit(script: Script) -> None:
+    agent = swapping(script)
+    agent.run_until(60.0)
+
+    said = statuses(agent.log)[-1]
+    assert said.phase is StatusPhase.SERVING
+    assert said.note == "swaps its battery at base b0"
+    assert [claim.stage for claim in claims(agent.log)][-1] is BaseStage.LANDED
