@@ -23,7 +23,7 @@ from agent.core.interface import (
     VehicleOrder,
     VehicleReady,
 )
-from agent.core.states import AgentState
+from agent.core.states import AT_BASE, VISITS_BASE, AgentState
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
@@ -73,6 +73,8 @@ TIMING = Timing()
 
 class Storm:
     """Random events for one agent, and what must hold after each."""
+
+    brief = BRIEF
 
     def __init__(self, seed: int) -> None:
         self.rng = np.random.default_rng(seed)
@@ -185,7 +187,7 @@ class Storm:
         sequence = [str(u) for u in self.rng.permutation(["u0", *OTHERS])]
         phase = self.pick(*[MissionPhase.RUNNING] * 60, MissionPhase.PREPARING, MissionPhase.ENDED)
         rule = self.pick("greedy", "lookahead")
-        body: Body = self.pick(BRIEF, posted, posted, epoch(*sequence, phase=phase, rule=rule))
+        body: Body = self.pick(self.brief, posted, posted, epoch(*sequence, phase=phase, rule=rule))
         return body
 
     def command(self) -> MessageReceived:
@@ -193,7 +195,7 @@ class Storm:
         kinds = [CommandKind.HOLD, CommandKind.RESUME, CommandKind.RESUME] * 9
         kind = self.pick(*kinds, CommandKind.RETURN, CommandKind.ABORT)
         target = FLEET if kind is CommandKind.ABORT else self.pick("u0", *OTHERS)
-        return self.heard(OPERATOR, OperatorCommand(target, kind, BRIEF.run, ""))
+        return self.heard(OPERATOR, OperatorCommand(target, kind, self.brief.run, ""))
 
     def learned(self) -> SnapshotsReceived:
         answers = [self.answer(writer) for writer in WRITERS]
@@ -243,7 +245,7 @@ def test_no_storm_of_events_raises_or_leaves_a_deadline_behind(block: int) -> No
 
 def test_the_storms_reach_every_state() -> None:
     """Else the test above would prove little."""
-    unreached = set(AgentState)
+    unreached = set(AgentState) - VISITS_BASE - AT_BASE  # see test_core_field_storms
     for seed in range(160):
         storm = Storm(seed)
         for _ in range(150):
