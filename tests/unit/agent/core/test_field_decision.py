@@ -5,13 +5,17 @@ from __future__ import annotations
 import math
 import random
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from agent.core.field_decision import decide_in_field, field_rule_of
+from agent.core.field_decision import decide_in_field, divert_in_field, field_rule_of
+from coordinator.planner.field_guided import field_guided_plan
+from coordinator.planner.options import after_evaluations
 from swarm.allocation.field import FieldProblem
 from swarm.allocation.field.rules import FIELD_RULES
+from swarm.kernels.field import FIELD_GREEDY
 from swarm.protocol.uav_messages import BaseStage
 from tests.support.field_dilemmas import dilemma
 from tests.support.field_missions import mission_of
@@ -70,3 +74,79 @@ def repeated(draft: Draft, rule: str, rng: random.Random) -> Iterator[Moment]:
             scores = [math.nan if x is None else x for x in (found.score, found.second_score)]
             np.testing.assert_array_equal(scores, run.runs.scores[k], err_msg=where)
         yield moment
+
+
+def guided_moments(seed: int, n_uav: int = 3, n_task: int = 7) -> tuple[FieldProblem, list[Moment]]:
+    """Turns along a run by greedy, and the problem."""
+    mission = mission_of(dilemma(seed, n_uav, n_task, slots=True))
+    problem = FieldProblem.from_mission(mission)
+    sequence = random.Random(seed).sample(range(n_uav), n_uav)
+    return problem, list(PlannedRun(mission, problem, FIELD_GREEDY, sequence).moments())
+
+
+def test_guided_uavs_free_at_once_take_different_tasks_that_their_plan_holds() -> None:
+    n_task = 0
+    for seed in range(12):
+        problem, moments = guided_moments(seed)
+        plan = field_guided_plan(problem, stop=after_evaluations(400))
+        routes = {
+            str(uav): tuple(str(problem.task_ids[task]) for task in route)
+            for uav, route in zip(problem.uav_ids, plan.routes, strict=True)
+        }
+        rule = field_rule_of("guided", routes)
+        assert rule is not None
+        board, turn = moments[0].board, moments[0].turn
+        taken = []
+        for row, uav in enumerate(problem.uav_ids):
+            others = {str(other) for other in problem.uav_ids if other != uav}
+            place = problem.network.node_enu_m[row].tolist() if problem.network else (0.0, 0.0, 0.0)
+            mine = replace(
+                turn,
+                uav=str(uav),
+                credible=others,
+                awaited=others,
+                place_enu_m=(place[0], place[1], place[2]),
+                sortie_end_s=float(problem.first_s[row]),
+            )
+            found = decide_in_field(problem, board, rule, mine)
+            assert found == decide_in_field(problem, board, rule, mine)
+            if found is None:
+                continue
+            assert found.score is not None
+            if found.task is not None:
+                taken.append(found.task)
+        assert len(set(taken)) == len(taken)
+        n_task += len(taken)
+    assert n_task > 0
+
+
+def test_who_turns_aside_takes_something_else_and_the_team_gains() -> None:
+    turned = 0
+    for seed in range(30):
+        problem, moments = guided_moments(seed)
+        rule = field_rule_of("guided", {})
+        assert rule is not None
+        for moment in moments:
+            for uav, claim in moment.board.replica.claims.items():
+                if uav == moment.turn.uav or claim.task is None or claim.departs_s is not None:
+                    continue
+                where = random.Random(seed)
+                mine = replace(
+                    moment.turn,
+                    uav=uav,
+                    credible=(set(moment.turn.credible) | {moment.turn.uav}) - {uav},
+                    awaited=(),
+                    place_enu_m=(where.uniform(0, 400), where.uniform(0, 400), 0.0),
+                    sortie_end_s=math.inf if claim.sortie_end_s is None else claim.sortie_end_s,
+                    landed_at=None,
+                )
+                found = divert_in_field(problem, moment.board, rule, mine)
+                if found is None:
+                    continue
+                assert found.task != claim.task
+                turned += 1
+    assert turned > 0
+
+
+def test_what_a_rule_is_called_must_be_known() -> None:
+    assert field_rule_of("nearest", {}) is None
