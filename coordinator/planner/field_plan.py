@@ -28,6 +28,7 @@ from coordinator.planner.options import (
 from coordinator.planner.sequence_search import Progress
 from swarm.allocation import Rule
 from swarm.allocation.field import FieldProblem, FieldState
+from swarm.allocation.field.network import TooManyLegsError
 from swarm.allocation.field.problem import FloatArray
 from swarm.allocation.field.rules import FIELD_RULES
 from swarm.kernels.field import FlownLists, fly_lists
@@ -70,12 +71,12 @@ def make_field_plan(asked: FieldRequest) -> Plan:
     """Plan a mission in the field; see `coordinator.planner.plan.make_plan`.
 
     Raises:
-        InputError: the method does not heed what the mission asks for.
+        InputError: the method does not heed what the mission asks for, or it has too many places.
         ProblemTooLargeError: method ``exact`` on a mission too large for it.
     """
     method = _field_method(asked)
     begin_s = asked.clock.now_s()
-    problem = FieldProblem.from_mission(asked.mission.known_at_start())
+    problem = _problem_of(asked.mission)
     ends = never if asked.stop is None else asked.stop
     search = _FieldSearch(problem, method, asked, ends)
     optimum = search.optimum()
@@ -102,6 +103,14 @@ def make_field_plan(asked: FieldRequest) -> Plan:
         )
         plan = replace(plan, bound=bound.objective, fewest_left_out=bound.fewest_left_out)
     return replace(plan, elapsed_s=asked.clock.now_s() - begin_s)
+
+
+def _problem_of(mission: Mission) -> FieldProblem:
+    try:
+        return FieldProblem.from_mission(mission.known_at_start())
+    except TooManyLegsError as error:
+        remedy = "fly fewer tasks at a time, or UAVs that are alike"
+        raise InputError(Fault(f"mission {mission.name}", "", str(error), remedy)) from error
 
 
 def _field_method(asked: FieldRequest) -> str:

@@ -21,6 +21,19 @@ IntArray = npt.NDArray[np.int32]
 
 START = -1
 """In the place of a base: the UAV's own start."""
+MOST_LEGS = 40_000_000
+"""From every node to every other, for each kind of UAV: tables of 0.3 GB, and a few times as much
+while they are made."""
+
+
+class TooManyLegsError(ValueError):
+    """The tables of a mission's legs would not fit."""
+
+    def __init__(self, n_node: int, n_kind: int) -> None:
+        super().__init__(
+            f"{n_node} starts, bases and ends of tasks for {n_kind} kinds of UAVs make "
+            f"{n_node * n_node * n_kind} legs, more than the {MOST_LEGS} that fit"
+        )
 
 
 class FieldNetwork:
@@ -35,6 +48,7 @@ class FieldNetwork:
 
     Raises:
         ValueError: there is not one layer for each UAV.
+        TooManyLegsError: there are more than `MOST_LEGS`.
     """
 
     def __init__(
@@ -66,6 +80,8 @@ class FieldNetwork:
                 kinds[model, sides] = len(kinds)
                 self._kinds.append((model, networks[sides]))
             kind.append(kinds[model, sides])
+        if len(self._kinds) * len(self.node_enu_m) ** 2 > MOST_LEGS:
+            raise TooManyLegsError(len(self.node_enu_m), len(self._kinds))
         self.kind: IntArray = np.array(kind, dtype=np.int32)
         """(n_uav,) row of the tables of legs."""
         self.leg_s: FloatArray = self._leg_s()

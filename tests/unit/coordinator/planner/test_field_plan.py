@@ -135,3 +135,17 @@ def test_schedules_of_plain_missions_come_with_schema_2_alone() -> None:
     for uav, entries in one["schedule"].items():
         assert [entry["go"] for entry in entries[:-1]] == one["routes"][uav]
         assert all(a["end_s"] == b["depart_s"] for a, b in pairwise(entries))
+
+
+def test_a_mission_whose_legs_would_not_fit_is_refused_in_one_line(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    mission = field_missions.mission_of(made_up(0, "energy"))
+    monkeypatch.setattr("swarm.allocation.field.network.MOST_LEGS", 50)
+
+    with pytest.raises(InputError) as refused:
+        make_plan(mission, "greedy", clock=SystemClock())
+
+    assert str(refused.value).startswith(f"mission {mission.name}: ")
+    assert "legs, more than the 50 that fit; fly fewer tasks" in str(refused.value)
+    assert "\n" not in str(refused.value)
