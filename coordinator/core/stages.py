@@ -110,8 +110,6 @@ class StagedMission:
         self._announcer = announcer
         self._board = board
         self._timing = timing
-        self._keeps_epoch = False
-        """Whether it has been told that the first epoch stays in force."""
         self._leave_at_s: float | None = None
         """When it leaves a mission that has ended, unless agents are there then."""
 
@@ -140,8 +138,7 @@ class StagedMission:
             case MissionStage.RUNNING:
                 yield self.end_condition.next_deadline_s()
                 yield self._announcer.next_release_s()
-                if self._board.field_problem is None:
-                    yield self.replan_policy.next_deadline_s()
+                yield self.replan_policy.next_deadline_s()
             case MissionStage.ENDED:
                 yield self._leave_at_s
             case _:
@@ -168,7 +165,7 @@ class StagedMission:
                 actions += self.end(reason, now_s)
         epoch = self._replica.epoch
         if self.stage is MissionStage.RUNNING and epoch is not None:
-            actions += self._plan_anew(epoch, now_s)
+            actions += self.replan_policy.pursue(lambda: self._situation(now_s), epoch, now_s)
         if not self.is_over:
             actions += self._announcer.repeat(now_s)
         return actions
@@ -205,7 +202,7 @@ class StagedMission:
         epoch, situation = self._replica.epoch, None
         if self.stage is MissionStage.RUNNING:
             situation = self._situation(now_s)
-        if epoch is None or situation is None or self._board.field_problem is not None:
+        if epoch is None or situation is None:
             self.replan_policy.drop()
             return []
         better = self.replan_policy.judge(replanned, situation, epoch, now_s)
@@ -249,17 +246,6 @@ class StagedMission:
         self.end_condition.settle()
         self._leave_at_s = now_s + self._timing.linger_s
         return self.replan_policy.stop()
-
-    def _plan_anew(self, epoch: PlanEpoch, now_s: float) -> list[CoordinatorAction]:
-        """Have the rest planned, if that is wanted; not yet where the field asks for more."""
-        if self._board.field_problem is None:
-            return self.replan_policy.pursue(lambda: self._situation(now_s), epoch, now_s)
-        if self._keeps_epoch:
-            return []
-        self._keeps_epoch = True
-        told: dict[str, object] = {"epoch": epoch.number}
-        told["because"] = "missions in the field are not planned anew in flight yet"
-        return [*self.replan_policy.stop(), LogLine("keeps its epoch", told)]
 
     def _start_if_ready(self, now_s: float) -> list[CoordinatorAction]:
         verdict, actions = self.gate.advance(now_s)
@@ -423,6 +409,8 @@ class ReplanPolicy:
             "withdrawn": now.withdrawn - before.withdrawn,
         }
         reasons = [f"{listed(sorted(ids), 3)} {what}" for what, ids in changes.items() if ids]
+        if now.zones != before.zones:
+            reasons.append("the operator has changed zones")
         if now.failures > before.failures:
             reasons.append("an attempt failed")
         if self._lateness_frac(now) > DRIFT_FRAC:

@@ -31,7 +31,9 @@ from swarm.protocol.board import (
     ranks,
     rule_of,
 )
+from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import PlanEpoch
+from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.uav_messages import AttemptResult, ClaimPhase, Outcome
 
 Lists = Mapping[str, tuple[str, ...]]
@@ -62,6 +64,8 @@ class Situation:
     withdrawn: frozenset[str]
     failures: int
     """Attempts that failed so far."""
+    zones: tuple[ZoneSpec, ...] = ()
+    """Where not to fly."""
     field: FieldStanding | None = None
     """The same under the field's constraints; None where there are none. ``state`` knows nothing
     of these: it tells who is where, and what is open."""
@@ -103,6 +107,7 @@ class Situation:
             under_way,
             frozenset(task for task, what in states.items() if what is TaskState.WITHDRAWN),
             sum(outcome.result is AttemptResult.FAILED for outcome in replica.outcomes.values()),
+            zones_in_force(replica),
             None
             if in_field is None
             else FieldStanding.of(in_field, board, claims, under_way, taking_part, mission_s),

@@ -7,12 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from coordinator.core.lifecycle import Replan, Replanned
 from coordinator.core.publication import (
     exit_status,
     mission_config_of,
     task_entry_of,
     unsayable,
 )
+from sim.world.settings import planned_anew
 from swarm.model import Base, BaseId, Mission, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.board import TaskBoard, is_of_field, mission_of
@@ -32,7 +34,6 @@ from tests.support.builders import (
     held,
     message,
     mission,
-    order,
     random_mission,
     task,
     uav,
@@ -41,6 +42,7 @@ from tests.support.field_missions import mission_of as mission_of_draft
 from tests.support.field_oracle.made_up import made_up
 from tests.support.lone_coordinator import (
     LAYERS,
+    TIMING,
     LoneCoordinator,
     finishes,
     notes,
@@ -124,38 +126,35 @@ def test_what_no_message_has_room_for_is_named_before_anybody_waits_for_it() -> 
     assert "a message has room for 1048576" in complaint
 
 
+def replans(coordinator: LoneCoordinator) -> list[Replan]:
+    return [action for action in coordinator.log if isinstance(action, Replan)]
+
+
 # -- the epoch ----------------------------------------------------------------------------
 
 
-def test_it_keeps_its_epoch_and_says_so_once() -> None:
-    timing = replace(LoneCoordinator(mission([U0], [WINDOWED])).timing, replan_interval_s=5.0)
-    coordinator = LoneCoordinator(mission([U0, U1], [WINDOWED]), timing=timing).started()
-    coordinator.hear(OPERATOR, order("op1"), 103.0)
-    coordinator.hear("u0", held("t0", 0.0), 104.0)
-    coordinator.run_until(130.0)
-
-    kept = [line for line in notes(coordinator.log) if line.text == "keeps its epoch"]
-    assert [line.fields["epoch"] for line in kept] == [1]
-    assert coordinator.epoch is not None
-    assert coordinator.epoch.number == 1
-    assert not [line for line in notes(coordinator.log) if line.text == "plans the rest"]
-
-
-def test_a_zone_drawn_in_flight_ends_planning_anew() -> None:
-    timing = replace(LoneCoordinator(mission([U0], [WINDOWED])).timing, replan_interval_s=5.0)
+def test_a_zone_drawn_or_taken_away_in_flight_is_a_reason_to_plan_the_rest_anew() -> None:
+    timing = replace(TIMING, replan_interval_s=5.0)
     flown = mission([U0, U1], [task("t0", 5.0), task("t1", 50.0)])
     coordinator = LoneCoordinator(flown, timing=timing).started()
     coordinator.hear("u0", held("t0", 0.0), 101.0)
-    coordinator.hear(OPERATOR, ZoneEdit(ZONE, False, 1, "crane"), 103.0)
-    coordinator.run_until(130.0)
+    coordinator.run_until(120.0)
+    assert replans(coordinator) == []
+
+    coordinator.hear(OPERATOR, ZoneEdit(ZONE, False, 1, "crane"), 123.0)
+    coordinator.run_until(140.0)
     (line,) = (line for line in notes(coordinator.log) if line.text == "zone by the operator")
     assert line.fields == {"zone": "z", "reason": "crane"}
-    assert [line.text for line in notes(coordinator.log)].count("plans the rest") == 0
+    (wanted,) = replans(coordinator)
+    assert wanted.reason == "the operator has changed zones"
+    assert wanted.situation.field is not None
 
-    coordinator.hear(OPERATOR, ZoneEdit(ZONE, True, 1, ""), 131.0)
-    coordinator.hear(OPERATOR, order("op1"), 132.0)
-    coordinator.run_until(150.0)
-    assert [line.text for line in notes(coordinator.log)].count("plans the rest") == 1
+    coordinator.happen(Replanned(wanted.request, planned_anew(wanted)), 141.0)
+    coordinator.run_until(160.0)
+    assert len(replans(coordinator)) == 1, "nothing has happened since"
+    coordinator.hear(OPERATOR, ZoneEdit(ZONE, True, 1, ""), 161.0)
+    coordinator.run_until(180.0)
+    assert [each.situation.field is None for each in replans(coordinator)] == [False, True]
 
 
 def test_before_the_start_it_plans_anew_round_a_zone() -> None:

@@ -103,11 +103,9 @@ def test_a_task_that_nobody_can_do_in_time_is_added_and_that_is_said() -> None:
     tracked = desk.give(NewTask(FAR, due_s=100.0))
     desk.confirm(tracked, "u0", "u1")
 
-    assert came(tracked) == (
-        RequestResult.OBEYED,
-        "op1 is on the board, worth 4; "
-        + "but no UAV can do it in time, or with its battery, or come there",
-    )
+    text = "no UAV can do it in time, or with its battery, or come there"
+    told = f"op1 is on the board, worth 4; but {text}"
+    assert came(tracked) == (RequestResult.OBEYED, told)
 
 
 def test_a_task_that_somebody_can_do_yet_is_looked_after_for_a_moment() -> None:
