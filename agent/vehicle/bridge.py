@@ -132,7 +132,7 @@ class Bridge:
         if (commands_s := session.commands.next_deadline_s()) is not None:
             deadlines_s.append(commands_s)
         silent_at_s = session.vehicle.silent_at_s(self.config.silence_timeout_s)
-        if silent_at_s is not None and activity.in_our_hands and not session.silent:
+        if silent_at_s is not None and session.now_s < silent_at_s and activity.in_our_hands:
             deadlines_s.append(silent_at_s)
         return min(deadlines_s)
 
@@ -286,9 +286,10 @@ class Bridge:
         out, ended = session.commands.on_time(now_s)
         session.say(*out)
         self._on_ended(ended)
-        if session.silent and self._activity.in_our_hands:
+        silent = session.silent
+        if silent and self._activity.in_our_hands:
             self._lose()
-        if not session.silent:
+        if not silent:
             if self._streams is not None:
                 session.say(*self._streams.advance(session.commands, now_s))
             session.advance_mission()

@@ -56,7 +56,8 @@ class Conversation:
 
     def say(self, *messages: Outbound) -> None:
         """To the vehicle."""
-        self._actions += [SendBytes(self.codec.encode(message)) for message in messages]
+        for message in messages:  # most often there is none
+            self._actions.append(SendBytes(self.codec.encode(message)))
 
     def report(self, report: VehicleReport) -> None:
         """To whoever gave the orders."""

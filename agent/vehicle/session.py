@@ -153,10 +153,10 @@ class VehicleSession(Conversation):
         """When mission or parameter may have something to do."""
         if self.mission is not None and self.mission.is_starting:
             return self.now_s + POLL_S
-        override = None if self.silent else self.override
+        override = self.override
         due_s = earliest(
             None if self.mission is None else self.mission.next_deadline_s(),
-            None if override is None else override.next_deadline_s(),
+            None if override is None or self.silent else override.next_deadline_s(),
         )
         return math.inf if due_s is None else max(due_s, self.now_s)
 

@@ -119,6 +119,8 @@ class FailsafeMonitor:
             self._pilot.outbox.text(regained.severity, regained.template)
 
     def _ground_lost_s(self) -> float | None:
+        if not self._ground_s:
+            return None
         lost = self._pilot.flavour.ground_lost(self._pilot.parameters)
         if lost is None:
             return None

@@ -80,27 +80,40 @@ class Pilot:
 
     def deadline_s(self) -> float:
         """When something happens next by itself [s]."""
-        return min(deadline_s for deadline_s, _ in self._deadlines())
+        return min([due_s for due_s in self._dues_s() if due_s is not None])
 
     def advance(self, now_s: float) -> None:
         """Let everything happen, in order and at its own instant, that is due by ``now_s``."""
         while True:
-            deadline_s, happen = min(self._deadlines(), key=lambda due: due[0])
-            if deadline_s > now_s:
+            dues_s = self._dues_s()
+            first_s = min([due_s for due_s in dues_s if due_s is not None])
+            if first_s > now_s:
                 return
-            happen(deadline_s)
+            self._happen(dues_s.index(first_s), first_s)
 
-    def _deadlines(self) -> list[tuple[float, Callable[[float], None]]]:
-        foreseen: list[tuple[float | None, Callable[[float], None]]] = [
-            (self._prearm_text_s, self._say_obstacle),
-            (self.readiness.deadline_s(), self._pass_stage),
-            (self.flight.deadline_s(), self._advance_flight),
-            (self.run.hold_until_s, self.run.end_hold),
-            (self.run.repeat_s, self.run.repeat),
-            (self._disarm_s, lambda at_s: self._disarm(at_s, self._disarm_occasion)),
-            (self.failsafes.deadline_s(), self.failsafes.advance),
-        ]
-        return [(due_s, happen) for due_s, happen in foreseen if due_s is not None]
+    def _dues_s(self) -> tuple[float | None, ...]:
+        """When each of what `_happen` knows is due; all of it is asked for at every step."""
+        return (
+            self._prearm_text_s,
+            self.readiness.deadline_s(),
+            self.flight.deadline_s(),
+            self.run.hold_until_s,
+            self.run.repeat_s,
+            self._disarm_s,
+            self.failsafes.deadline_s(),
+        )
+
+    def _happen(self, what: int, at_s: float) -> None:
+        happenings: tuple[Callable[[float], None], ...] = (
+            self._say_obstacle,
+            self._pass_stage,
+            self._advance_flight,
+            self.run.end_hold,
+            self.run.repeat,
+            lambda at_s: self._disarm(at_s, self._disarm_occasion),
+            self.failsafes.advance,
+        )
+        happenings[what](at_s)
 
     def _pass_stage(self, at_s: float) -> None:
         stage = self.readiness.advance()
