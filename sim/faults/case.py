@@ -11,12 +11,16 @@ from typing import Final
 
 import numpy as np
 
+from coordinator.planner.field_plan import is_field
+from sim.faults.field_missions import random_field_mission
+from sim.faults.field_plans import quick_field_plan
 from sim.faults.injector import FaultInjector
 from sim.faults.invariants import InvariantChecker
 from sim.faults.message_log import Violation
 from sim.faults.planted_bugs import BUGS
 from sim.faults.schedule import Disturbance, DisturbanceKind, format_schedule, parse_schedule
 from sim.world.engine import EventQueue, LocalClock, stream
+from sim.world.field_vehicle import vehicles_of
 from sim.world.motion import flown_s
 from sim.world.network import NetworkConditions, Topology
 from sim.world.rough_network import RoughNetwork
@@ -34,6 +38,8 @@ FIRST_WITH_ACCELERATION: Final = 1_000_000
 """Of the seeds; missions of those before stay as they were."""
 TIMING: Final = Timing(status_s=2.0)
 """The defaults, with a calmer status: nothing but the count of steps depends on it here."""
+FIRST_IN_FIELD: Final = 2_000_000
+"""Of the seeds whose missions have all of the field's constraints."""
 CLOCK_PPM: Final = 100.0
 AREA_M: Final = 120.0
 KINDS_OF_TASK: Final = ("look", "lift")
@@ -74,6 +80,9 @@ class Case:
         """The mission."""
         if self.mission is not None:
             return self.mission
+        if self.seed >= FIRST_IN_FIELD:
+            most = MOST_UAVS, MOST_TASKS
+            return random_field_mission(self.seed, most, self.uavs, self.tasks, self.popups)
         return _random_mission(self.seed, self.uavs, self.tasks, self.popups)
 
     def processes(self) -> tuple[str, ...]:
@@ -95,6 +104,8 @@ class CaseResult:
 
 def quick_plan(mission: Mission, method: str, seed: int) -> Plan:
     """The greedy lists of a random sequence: how good a plan is does not matter here."""
+    if is_field(mission):
+        return quick_field_plan(mission, method, seed)
     problem = Problem.from_mission(mission.known_at_start())
     sequence = stream(seed, "sequence").permutation(problem.n_uav).tolist()
     start, rule = TeamState.at_start(problem), rule_by_name("greedy")
@@ -148,6 +159,7 @@ def play(
                 },
                 plan_s=0.05,
                 telemetry_gap_s=0.2,
+                vehicle=vehicles_of(mission),
             ),
             watch=judge,
         )
@@ -180,8 +192,18 @@ def limit_s(case: Case) -> float:
     work_s += sum(each.kind is DisturbanceKind.ADD for each in case.schedule) * across_s
     if any(each.kind is DisturbanceKind.HOLD for each in case.schedule):
         last_s += OPERATOR_PATIENCE_S
+    if is_field(mission):
+        work_s += _field_work_s(mission, across_s)
     waits_s = TIMING.abandon_s + TIMING.stalemate_s + 2.0 * TIMING.reconsider_s + 60.0
     return max(last_s, appears_s) + work_s + waits_s
+
+
+def _field_work_s(mission: Mission, across_s: float) -> float:
+    """What may come on top: ways round zones in wind, windows, and a swap before every task."""
+    swap_s = max((base.swap_s for base in mission.bases), default=0.0)
+    opens_s = max((task.opens_s for task in mission.tasks), default=0.0)
+    visit_s = 4.0 * across_s + len(mission.uavs) * swap_s
+    return opens_s + (len(mission.tasks) + len(mission.uavs)) * visit_s
 
 
 def format_case(case: Case) -> str:

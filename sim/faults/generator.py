@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from coordinator.planner.field_plan import is_field
 from coordinator.planner.plan import make_plan
 from sim.faults.case import MOST_TASKS, MOST_UAVS, Case, CaseResult, play
 from sim.faults.schedule import Disturbance, DisturbanceKind, parse_schedule, shape_of
@@ -101,12 +102,14 @@ def _draw(
         kind=kind,
         names=_names(rng, shape.names, coordinators, uavs, [t.id for t in mission.tasks]),
         lasts_s=lasts_s,
-        amount=_amount(rng, kind) if shape.amount else None,
+        amount=_amount(rng, kind, is_field(mission)) if shape.amount else None,
         memory=memory,
     )
 
 
-def _amount(rng: np.random.Generator, kind: DisturbanceKind) -> float:
+def _amount(rng: np.random.Generator, kind: DisturbanceKind, in_field: bool) -> float:
+    if in_field and kind is DisturbanceKind.SLOW:  # a reserve is not for more
+        return round(float(rng.uniform(0.85, 1.0)), 2)
     low, high = {DisturbanceKind.WEATHER: (0.02, 0.5), DisturbanceKind.SKEW: (0.05, 1.0)}.get(
         kind, (0.4, 1.0)
     )

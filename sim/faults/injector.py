@@ -18,6 +18,14 @@ from swarm.protocol.fields import Point
 from swarm.protocol.messages import CommandKind
 
 
+_LEAVES_ALONE = (
+    DisturbanceKind.CRASH,
+    DisturbanceKind.HANG,
+    DisturbanceKind.DEADLOCK,
+    DisturbanceKind.HOLD,
+)
+
+
 class FaultInjector:
     """Plays one schedule in a world that has not begun."""
 
@@ -26,6 +34,8 @@ class FaultInjector:
     ) -> None:
         self.held_for_good: set[Process] = set()
         """Processes that hang and never go on."""
+        self.left_alone: set[str] = set()
+        """UAVs whose agents were not always at work, or were stopped by the operator."""
         self._world = world
         self._network = network
         self._disturbed_s = 0.0
@@ -44,6 +54,8 @@ class FaultInjector:
     def _begin(self, what: Disturbance) -> None:
         world, network, names = self._world, self._network, what.names
         self._disturb()
+        if what.kind in _LEAVES_ALONE:
+            self.left_alone |= set(what.names)
         match what.kind:
             case DisturbanceKind.LOSE:
                 world.lose(names[0])

@@ -17,6 +17,8 @@ Beside the invariants of the messages (sim.faults.message_log):
   that had begun, and came home of its own accord; or the operator added it too late, when the
   coordinator ended the mission;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
+- in the field those of `sim.faults.field_judge`, but for batteries of UAVs whose agents were no
+  longer at work, or stopped by the operator; there a task is not lost that nobody could have done;
 - *miscounted*: the observer knows the visits of every UAV that left in calm, invents none, and
   counts as duplicates all that it knows of, and no more than there were.
 
@@ -29,12 +31,15 @@ from __future__ import annotations
 import itertools
 import traceback
 from collections.abc import Iterator
+from dataclasses import replace
 
 from agent.core.agent_core import IMPOSSIBLE, AgentCore
 from agent.core.interface import GoTo
 from coordinator.core.active import CoordinatorCore
 from coordinator.core.standby import StandbyCore
 from coordinator.mission_view.mission_state import MissionState
+from coordinator.planner.field_plan import is_field
+from sim.faults.field_judge import Chances, FieldJudge
 from sim.faults.injector import FaultInjector
 from sim.faults.message_log import MessageLog, Violation
 from sim.world.engine import Process
@@ -53,6 +58,8 @@ SETTLED_S = 5.0
 LOOK_EVERY_S = 0.5
 STEPS_AT_ONCE = 3000
 """More steps of all processes without time passing are a loop."""
+_LATE_S = 2.0
+"""What is forgiven of windows: clocks jump, and words are late."""
 _IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
 
 
@@ -218,6 +225,8 @@ class InvariantChecker:
             self._look_for_lost_tasks()
         if self.broken is None:
             self._look_at_the_count()
+        if self.broken is None and is_field(self._world.mission):
+            self._look_at_the_flights()
 
     def _look_for_the_missing(self) -> None:
         living = [(process, core) for process, core in self._living() if process.writer is not None]
@@ -258,9 +267,25 @@ class InvariantChecker:
                 and task.id in to_do.get(uav.id, ())
                 and (uav.id, task.id) not in world.refuses
             ]
+            if able and is_field(world.mission):
+                able = self._able_in_field(able, task)
             if able:
                 text = f"{task.id} is open, though {', '.join(able)} could have done it"
                 self._break("task lost", text)
+
+    def _able_in_field(self, uavs: list[str], task: Task) -> list[str]:
+        """Those of ``uavs`` that could have done ``task`` when they were sent home."""
+        world = self._world
+        known = {each.id: each for each in (*world.mission.tasks, task)}
+        mission = replace(world.mission, tasks=tuple(known.values()))
+        seen = {uav: s for uav, s in world.flight_log.last_seen.items() if uav in uavs}
+        return Chances(mission, world.zero_s or 0.0).could_do(seen, [task.id]).get(task.id, [])
+
+    def _look_at_the_flights(self) -> None:
+        for invariant, text in FieldJudge(self._world, time_s=_LATE_S).complaints():
+            uav = text.partition(" ")[0]
+            if not (invariant == "fell" and uav in self._injector.left_alone):
+                self._break(invariant, text)
 
     def _look_at_the_count(self) -> None:
         mission_state, true = self._world.mission_state, self.message_log.visits

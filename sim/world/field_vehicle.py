@@ -32,8 +32,12 @@ from sim.world.engine import EventQueue
 from sim.world.field_paths import FieldPaths
 from sim.world.flown_path import FlownPath
 from sim.world.motion import Point, between, minus, plus
+from sim.world.settings import ideal_vehicle
 from sim.world.track import Track, drifting
 from sim.world.uncertainty import Realization
+from sim.world.vehicles import SimulatedVehicle, VehicleFactory
+from swarm.model import Mission
+from swarm.model.mission import PLAIN_CONSTRAINTS
 
 _AT_REST: Point = (0.0, 0.0, 0.0)
 _ABOVE_M = 0.5
@@ -330,3 +334,19 @@ class FieldVehicle:
                 do()
 
         self._queue.at(time_s, act)
+
+
+def vehicles_of(
+    mission: Mission, takeoff_s: float = 0.0, fate: Realization | None = None
+) -> VehicleFactory:
+    """Ideal vehicles of the UAVs of ``mission``, or those of a realization in the field."""
+    if PLAIN_CONSTRAINTS.issuperset(mission.constraints):
+        return ideal_vehicle
+    paths = FieldPaths(mission)
+
+    def make(
+        queue: EventQueue, uav: str, report: Callable[[VehicleReport], None]
+    ) -> SimulatedVehicle:
+        return FieldVehicle(queue, uav, report, paths, takeoff_s, fate)
+
+    return make

@@ -19,8 +19,7 @@ from agent.core.agent_core import AgentCore
 from agent.core.interface import GoTo, VehicleReport
 from coordinator.mission_view.mission_state import MissionState
 from sim.world.engine import EventQueue, Process
-from sim.world.field_paths import FieldPaths
-from sim.world.field_vehicle import FieldVehicle
+from sim.world.field_vehicle import vehicles_of
 from sim.world.motion import flown_s
 from sim.world.network import IdealNetwork, Network, NetworkConditions, Topology
 from sim.world.outcome import Tally
@@ -257,18 +256,8 @@ def _last_change_s(mission: Mission, fate: Realization) -> float:
 def _vehicles(fate: Realization) -> VehicleFactory:
     if PLAIN_CONSTRAINTS.issuperset(fate.mission.constraints):
         return partial(_vehicle, fate)
-    return partial(_field_vehicle, fate, FieldPaths(fate.mission))
-
-
-def _field_vehicle(
-    fate: Realization,
-    paths: FieldPaths,
-    queue: EventQueue,
-    uav: str,
-    report: Callable[[VehicleReport], None],
-) -> SimulatedVehicle:
     takeoff_s = 0.0 if fate.uncertainty.ideal_communication else _TAKEOFF_S
-    return FieldVehicle(queue, uav, report, paths, takeoff_s, fate if _troubled(fate) else None)
+    return vehicles_of(fate.mission, takeoff_s, fate if _troubled(fate) else None)
 
 
 def _troubled(fate: Realization) -> bool:
@@ -334,5 +323,8 @@ def _limit_s(fate: Realization, timing: Timing) -> float:
     )
     work_s = sum(task.service_s + slowest_s for task in mission.tasks)
     appears_s = max((task.appears_s for task in mission.tasks), default=0.0)
+    opens_s = max((task.opens_s for task in mission.tasks), default=0.0)
+    swap_s = max((base.swap_s for base in mission.bases), default=0.0)
+    work_s += len(mission.tasks) * len(mission.uavs) * swap_s + opens_s
     waits_s = timing.abandon_s + timing.stalemate_s + timing.linger_s + 2.0 * timing.silence_s
     return _START_S + appears_s + 4.0 * work_s + 10.0 * waits_s
