@@ -17,7 +17,6 @@ from sim.world.virtual_world import World
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import CommandKind
 
-
 _LEAVES_ALONE = (
     DisturbanceKind.CRASH,
     DisturbanceKind.HANG,
