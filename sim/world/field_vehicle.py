@@ -43,6 +43,8 @@ _AT_REST: Point = (0.0, 0.0, 0.0)
 _ABOVE_M = 0.5
 """Who is nearer than that to a place, seen from above, is there [m]."""
 _SAME_BASE_M = 1.0
+_TOLERANCE_S = 1e-6
+"""Limits are inclusive: who lands at the very instant at which its battery is empty has landed."""
 
 
 class FieldVehicle:
@@ -91,6 +93,8 @@ class FieldVehicle:
         """What of its height is its layer's at both ends of its path."""
         self._flies = False
         self._swap_ends_s = -math.inf
+        self._swapped = False
+        """Whether it stands with another battery, or is about to get one."""
         self._astray_m = self._becomes_m = _AT_REST
         """From where it believes to be to where it is, at both ends of its path [m]."""
         self._orders = 0
@@ -191,8 +195,10 @@ class FieldVehicle:
 
     def _touch_down_for(self, order: Swap) -> None:
         now_s = self._queue.now_s()
-        if self._flies:
-            self._touch_down(order.position_enu_m, now_s)
+        if self._flies or not self._swapped:
+            if self._flies:
+                self._touch_down(order.position_enu_m, now_s)
+            self._swapped = True
             self._swap_ends_s = now_s + (self._base_swap_s(order.position_enu_m) or 0.0)
             self._queue.at(self._swap_ends_s, self._change_battery)
         self._later(now_s, Landed(order.leg))
@@ -265,7 +271,7 @@ class FieldVehicle:
         self._lift_off(now_s)
 
     def _lift_off(self, at_s: float) -> None:
-        self._flies = True
+        self._flies, self._swapped = True, False
         if self._place_enu_m is not None:
             self.track.lift_off(plus(self._place_enu_m, self._astray_m), at_s)
         if self.battery is not None and self._mission_runs:
@@ -284,11 +290,11 @@ class FieldVehicle:
     def _watch_battery(self) -> None:
         """Look when the battery should be empty; what has changed it by then has looked anew."""
         if self.battery is not None and self.battery.empty_s < math.inf:
-            self._queue.at(self.battery.empty_s, self._fall_if_empty)
+            self._queue.at(self.battery.empty_s + _TOLERANCE_S, self._fall_if_empty)
 
     def _fall_if_empty(self) -> None:
         battery, now_s = self.battery, self._queue.now_s()
-        if battery is None or not self._flies or battery.empty_s > now_s:
+        if battery is None or not self._flies or battery.empty_s + _TOLERANCE_S > now_s:
             return
         self._rest(now_s)
         self._orders += 1  # it says nothing any more

@@ -233,8 +233,12 @@ class FlightLog:
     def _return(
         self, uav: str, flown: _Flown, order: Return, place_enu_m: Point, now_s: float
     ) -> None:
-        track = self._tracks.get(uav)
+        track, leg = self._tracks.get(uav), flown.open
         if track is not None and not track.airborne:
+            if leg is not None and leg.base is not None and leg.begin_s is not None:
+                # The swap that it has begun is for nothing any more: it is home there.
+                flown.entries.append(_entry(leg, leg.begin_s))
+                flown.open = None
             return
         flown.leave()
         corners = [*order.path_enu_m, *([] if order.via_enu_m is None else [order.via_enu_m])]
