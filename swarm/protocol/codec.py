@@ -35,7 +35,7 @@ from swarm.protocol.encoding import (
     LARGE,
     LARGE_LIMIT_BYTES,
     NAMES,
-    SINCE_FIELD,
+    PLAIN_FIELDS,
     SMALL_LIMIT_BYTES,
     SNAPSHOT_LIMIT_BYTES,
     encode,
@@ -88,8 +88,7 @@ to the end of a body under the `SCHEMA_VERSION` in force."""
 
 
 _PLAIN: Final[Mapping[str, frozenset[str]]] = {
-    kind: frozenset(FIELDS[body]) - SINCE_FIELD.get(body, frozenset())
-    for kind, body in KINDS.items()
+    kind: frozenset(PLAIN_FIELDS[body]) for kind, body in KINDS.items()
 }
 """By kind, the fields that every statement of it has."""
 

@@ -77,6 +77,11 @@ FIELD_DEFAULTS: Final[dict[type, dict[str, object]]] = {
     for part, names in SINCE_FIELD.items()
 }
 """What they are then."""
+PLAIN_FIELDS: Final[dict[type, tuple[str, ...]]] = {
+    part: tuple(name for name in names if name not in SINCE_FIELD.get(part, ()))
+    for part, names in FIELDS.items()
+}
+"""All others."""
 _NOTHING: Final[dict[str, object]] = {}
 LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
 
@@ -132,12 +137,11 @@ def _message_bytes(message: Message) -> bytes:
 
     def fields_of(part: object) -> dict[str, object]:
         nonlocal version
-        told = {name: getattr(part, name) for name in FIELDS[type(part)]}
+        told = {name: getattr(part, name) for name in PLAIN_FIELDS[type(part)]}
         for name, default in FIELD_DEFAULTS.get(type(part), _NOTHING).items():
-            if told[name] == default:
-                del told[name]
-            else:
-                version = FIELD_VERSION
+            value = getattr(part, name)
+            if value is not default and value != default:
+                told[name], version = value, FIELD_VERSION
         return told
 
     body: bytes = msgpack.packb(message.body, default=fields_of)

@@ -171,16 +171,20 @@ class Claim(Checked):
             raise ValueError(f"a claim that is {self.phase} names nothing")
         if not taken and self.task is not None:
             raise ValueError(f"a claim that is {self.phase} names {self.task}")
-        if (self.base is None) != (self.stage is None):
-            raise ValueError(f"a claim on {self.base} is {self.stage}")
+        if self.reversed is not None and self.task is None:
+            raise ValueError("a claim on no task is reversed")
+        if self.base is not None or self.stage is not None:
+            self._require_visit(taken=taken)
+        elif self.arrives_s is not None or self.departs_s is not None:
+            raise ValueError("a claim on no base arrives there or departs")
+
+    def _require_visit(self, *, taken: bool) -> None:
+        if self.base is None or self.stage is None:
+            raise ValueError(f"a claim on base {self.base} is {self.stage}")
         if not taken and self.stage in (BaseStage.APPROACHING, BaseStage.WAITING):
             raise ValueError(f"a claim that is {self.phase} is {self.stage}")
-        if self.base is None and self.arrives_s is not None:
-            raise ValueError("arrives at no base")
-        if self.task is None and self.reversed is not None:
-            raise ValueError("reversed, but no task")
-        if self.departs_s is not None and (self.task is None or self.base is None):
-            raise ValueError("departs from a base to a task, but lacks one of them")
+        if self.departs_s is not None and self.task is None:
+            raise ValueError("a claim that departs from a base names no task")
 
     @property
     def is_taken(self) -> bool:

@@ -171,7 +171,7 @@ def test_claims_on_bases_come_through(claim: Claim) -> None:
 def test_claims_that_contradict_themselves_are_none(
     claim: Claim, change: dict[str, object]
 ) -> None:
-    with pytest.raises(ValueError, match=r"claim|arrives|reversed|departs"):
+    with pytest.raises(ValueError, match="a claim "):
         replace(claim, **change)  # type: ignore[arg-type]  # each case names real fields
 
 
