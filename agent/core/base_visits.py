@@ -97,6 +97,11 @@ class BaseVisits(AgentPart):
         ready = {uav for uav in lost if self._vouched.get(uav, (None, None))[1] == claims.get(uav)}
         return bases.blocking(claims, lost, ready)
 
+    def is_blocked(self, base: BaseSpec) -> bool:
+        """Whether lost UAVs stand on all slots of a base, so that to wait there is in vain."""
+        standing = sum(where == base.id for where in self.blocking().values())
+        return base.slots is not None and standing >= base.slots
+
     def situated(self, claim: Claim) -> Claim:
         """``claim`` with the base at which the vehicle stands, and until when it can fly."""
         base, before = self.stands_at, self.claim
@@ -200,7 +205,8 @@ class BaseVisits(AgentPart):
         if visit.waited_at_s is not None and visit.waited_at_s <= now_s:
             visit.waited_at_s, visit.waited = None, True
         base = self._base()
-        if base is None or (self._machine.state is not AgentState.SWAPPING and self._blocked(base)):
+        on_slot = self._machine.state is AgentState.SWAPPING
+        if base is None or (not on_slot and self.is_blocked(base)):
             self.break_off("the base is gone" if base is None else "its slots are blocked", now_s)
         elif self._machine.state is AgentState.ABOVE_BASE:
             self._land_or_wait(base, now_s)
@@ -223,11 +229,6 @@ class BaseVisits(AgentPart):
     def _base(self) -> BaseSpec | None:
         claim = self.claim
         return None if claim is None or claim.base is None else self._flights.base(claim.base)
-
-    def _blocked(self, base: BaseSpec) -> bool:
-        """Whether lost UAVs stand on all its slots, so that waiting is in vain."""
-        standing = sum(where == base.id for where in self.blocking().values())
-        return base.slots is not None and standing >= base.slots
 
     # -- there ---------------------------------------------------------------------------
 

@@ -467,7 +467,8 @@ class FieldTasking(Tasking):
         base, way = self._flights.base(home.base), self._flights.way_to_base(home.base)
         if base is None or way is None or epoch is None or problem is None:
             return
-        if home.base not in self._refused_bases.left_alone(now_s):
+        refused = home.base in self._refused_bases.left_alone(now_s)
+        if not (refused or self._visits.is_blocked(base)):
             arrives_s = self._mission_view.mission_s(now_s) + way.duration_s
             rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
             ready_s = arrives_s + base.swap_s
