@@ -221,9 +221,6 @@ def simulate(
         ValueError: no fleet can fly by that, or a number is out of range.
         SwarmError: the recording cannot be written.
     """
-    from swarm.scenario import require_plain
-
-    require_plain(mission, "swarm.simulate")
     flown: Flight = _implementation("simulate")(
         mission,
         policy,

@@ -67,12 +67,14 @@ def simulate(
     planned. Each kind of uncertainty is drawn from the seed by itself, so asking for one leaves
     what the others draw as it was. With --faults the network and the clocks are like real ones,
     what goes wrong is told on standard error in lines that a file may hold, and the invariants of
-    a fleet are watched. Exit status 0: every task was done, and no invariant broken. With --from
+    a fleet are watched. Exit status 0: every task
+    was done that has to be and can be, and no invariant broken. With --from
     FILE.mcap, which takes no scenario and no other option but --json, decisions that were recorded
     are made again; exit status 0: none came out otherwise.
 
     Examples:
         swarm simulate table-1
+        swarm simulate reservoir-inspection --method guided
         swarm simulate valley-survey --loss 0.3 --popup 0.3 --seed 7
         swarm simulate valley-survey --method guided --loss 0.3 --coordinator-lost-s 0
         swarm simulate table-1 --outcomes --reattempt --seed 1
@@ -92,12 +94,11 @@ def simulate(
     from coordinator.terminal.report import MissionReport
     from sim.world.simulation import recording_simulation, simulate_mission
     from sim.world.uncertainty import Uncertainty
-    from swarm.scenario import load_scenario, require_plain
+    from swarm.scenario import load_scenario
 
     check_flight(method, report, record)
     uncertainty = chance.changed(Uncertainty())
     mission = with_reattempts(load_scenario(scenario), reattempt=chance.reattempt)
-    require_plain(mission, "swarm simulate")
     if faults is not None:
         if record is not None:
             problem, remedy = "does not go with --faults", "leave one of them out"

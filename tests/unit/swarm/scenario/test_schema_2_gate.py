@@ -20,7 +20,6 @@ ALL = (
 )
 COMMANDS: dict[str, list[str]] = {
     "swarm plan --export": ["plan", "FILE", "--export", "plans"],
-    "swarm simulate": ["simulate", "FILE"],
     "swarm run": ["run", "FILE"],
     "swarm coordinator": ["coordinator", "FILE"],
     "swarm autopilot": ["autopilot", "FILE"],
@@ -51,7 +50,7 @@ def test_python_names_it_too(tmp_path: Path) -> None:
     path.write_text(SCHEMA_2)
     mission = swarm.load(path)
 
-    for does in (swarm.simulate, lambda mission: swarm.evaluate(mission, {})):
+    for does in (lambda mission: swarm.evaluate(mission, {}),):
         with pytest.raises(swarm.SwarmError, match="does not heed airspeed_m_s, "):
             does(mission)
 
