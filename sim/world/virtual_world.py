@@ -349,7 +349,9 @@ class World:
         return vehicle
 
     def _fall(self, uav: str) -> None:
-        """Its battery is empty in the air: it is lost."""
+        """Its battery is empty in the air: it is lost, unless it was already."""
+        if uav not in self._vehicles:
+            return
         self.fallen_s[uav] = self.queue.now_s()
         self.when_fallen(uav)
         self.lose(uav)
