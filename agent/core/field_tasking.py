@@ -61,6 +61,7 @@ class FieldTasking(Tasking):
     def begin(self, now_s: float) -> None:
         """The vehicle takes targets: as in a plain mission, or on to an earlier life's base."""
         me, claim = self._mission_view.me, self._replica.claims.get(self._uav)
+        self._visits.leave_ground()
         if me is not None:
             self._sortie.begin(me, self._mission_view.mission_s(now_s))
         visits = claim is not None and claim.stage in (BaseStage.APPROACHING, BaseStage.WAITING)
