@@ -20,7 +20,7 @@ from agent.core.interface import (
 from agent.core.states import AgentState
 from swarm.allocation.field import FieldProblem
 from swarm.allocation.field.ways import base_node, task_nodes
-from swarm.model import TaskId, UavId
+from swarm.model import BaseId, TaskId, UavId
 from swarm.model.ids import OPERATOR
 from swarm.protocol.board import TaskBoard
 from swarm.protocol.events import Stop
@@ -85,8 +85,8 @@ class Script:
             sortie_end_s = times_s[0] + float(problem.full_s[row])
         return FieldTurnDecision(
             0,
-            None if base is not None else task,
-            base,
+            None if base is not None else TaskId(task),
+            None if base is None else BaseId(base),
             backwards,
             *times_s,
             sortie_end_s,
@@ -163,8 +163,8 @@ class FieldAgent(LoneAgent):
 
     # -- what came of it ---------------------------------------------------------------
 
-    @property
     def state(self) -> AgentState:
+        """What it is about; asked anew each time, as checkers take properties for constant."""
         return self.core.state
 
     @property

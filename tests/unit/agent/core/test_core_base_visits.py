@@ -35,7 +35,7 @@ def on_its_way(script: Script, *others: str, **more: object) -> FieldAgent:
     agent.fly_to(entry("t0", 100.0))
     script.items = ["base:b0"]
     agent.start_mission()
-    assert agent.state is AgentState.FLYING_TO_BASE
+    assert agent.state() is AgentState.FLYING_TO_BASE
     return agent
 
 
@@ -45,7 +45,7 @@ def swapping(script: Script, *others: str, **more: object) -> FieldAgent:
     agent.run_until(49.0)
     agent.arrive(50.0)
     agent.touch_down(50.0)
-    assert agent.state is AgentState.SWAPPING
+    assert agent.state() is AgentState.SWAPPING
     return agent
 
 
@@ -69,7 +69,7 @@ def test_it_lands_at_once_where_nobody_else_needs_the_slot(script: Script) -> No
     agent.arrive(50.0)
 
     assert agent.landing.position_enu_m == (50.0, 0.0, 0.0)
-    assert (agent.state, agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+    assert (agent.state(), agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
     assert agent.claim is not None
     assert agent.claim.completion_s == 50.0 + SWAP_S
     agent.touch_down(51.0)
@@ -86,7 +86,7 @@ def test_a_full_battery_makes_it_free_and_with_nothing_to_do_it_leaves_the_slot(
 
     assert script.turns[-1].landed_at == "b0"
     assert not script.turns[-1].parked
-    assert agent.state is AgentState.READY_ON_GROUND
+    assert agent.state() is AgentState.READY_ON_GROUND
     assert (agent.phase, agent.stage) == (ClaimPhase.IDLE, BaseStage.PARKED)
     assert agent.core.phase is StatusPhase.IDLE
     assert not isinstance(agent.last_order, GoTo)
@@ -98,7 +98,7 @@ def test_it_takes_off_for_its_next_task_with_a_new_sortie(script: Script) -> Non
 
     agent.get_full(70.0)
 
-    assert agent.state is AgentState.FLYING
+    assert agent.state() is AgentState.FLYING
     assert agent.flight.position_enu_m == (100.0, 0.0, 10.0)
     claim = agent.claim
     assert claim is not None
@@ -118,15 +118,15 @@ def test_it_holds_its_slot_until_it_has_to_depart(script: Script) -> None:
 
     claim = agent.claim
     assert claim is not None
-    assert agent.state is AgentState.DEPARTING
+    assert agent.state() is AgentState.DEPARTING
     assert (claim.task, claim.base, claim.stage) == ("t0", "b0", BaseStage.LANDED)
     assert claim.departs_s == 150.0
     assert isinstance(agent.last_order, Swap)
     agent.run_until(149.9)
-    assert agent.state is AgentState.DEPARTING
+    assert agent.state() is AgentState.DEPARTING
     assert agent.phase is ClaimPhase.HELD
     agent.run_until(150.0)
-    assert agent.state is AgentState.FLYING
+    assert agent.state() is AgentState.FLYING
     assert agent.flight.position_enu_m == (100.0, 0.0, 10.0)
     claim = agent.claim
     assert claim is not None
@@ -146,7 +146,7 @@ def test_a_task_lost_before_take_off_leaves_it_on_the_ground(script: Script) -> 
 
     agent.post(entry("t0", 100.0, opens_s=200.0, withdrawn=True))
 
-    assert agent.state is AgentState.READY_ON_GROUND
+    assert agent.state() is AgentState.READY_ON_GROUND
     assert (agent.phase, agent.stage) == (ClaimPhase.IDLE, BaseStage.PARKED)
     assert not isinstance(agent.last_order, GoTo)
 
@@ -159,12 +159,12 @@ def test_it_waits_above_a_base_whose_slot_is_held_and_lands_when_that_is_left(
     agent.run_until(49.0)
     agent.arrive(50.0)
 
-    assert (agent.state, agent.stage) == (AgentState.ABOVE_BASE, BaseStage.WAITING)
+    assert (agent.state(), agent.stage) == (AgentState.ABOVE_BASE, BaseStage.WAITING)
     assert agent.core.phase is StatusPhase.FLYING
     agent.run_until(60.0)
-    assert agent.state is AgentState.ABOVE_BASE
+    assert agent.state() is AgentState.ABOVE_BASE
     agent.hear("u1", visiting(BaseStage.PARKED, 5.0), 61.0)
-    assert (agent.state, agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+    assert (agent.state(), agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
     assert isinstance(agent.last_order, Swap)
 
 
@@ -174,11 +174,11 @@ def test_of_two_that_wait_the_first_to_arrive_lands_first(script: Script) -> Non
     agent.run_until(49.0)
     agent.arrive(50.0)
     agent.run_until(60.0)
-    assert agent.state is AgentState.ABOVE_BASE
+    assert agent.state() is AgentState.ABOVE_BASE
 
     agent.hear("u1", visiting(BaseStage.WAITING, 55.0), 61.0)
 
-    assert agent.state is AgentState.SWAPPING
+    assert agent.state() is AgentState.SWAPPING
 
 
 def test_a_claim_that_others_may_still_object_to_does_not_land(script: Script) -> None:
@@ -192,7 +192,7 @@ def test_a_claim_that_others_may_still_object_to_does_not_land(script: Script) -
 
     if agent.stage is BaseStage.APPROACHING:  # no limit of slots needs no window
         agent.run_until(1.0)
-    assert agent.state is AgentState.SWAPPING
+    assert agent.state() is AgentState.SWAPPING
 
 
 def test_a_base_with_a_dead_slot_holder_is_left_until_the_operator_says_it_is_ready(
@@ -205,14 +205,14 @@ def test_a_base_with_a_dead_slot_holder_is_left_until_the_operator_says_it_is_re
 
     agent.lose("u1", 60.0)
 
-    assert agent.state is AgentState.IDLE
+    assert agent.state() is AgentState.IDLE
     assert script.turns[-1].blocking == {"u1": "b0"}
     script.items = ["base:b0"]
     agent.vouched("u1", 70.0)
     assert script.turns[-1].blocking == {}
     agent.run_until(70.9)
     agent.arrive(71.0)
-    assert agent.state is AgentState.SWAPPING
+    assert agent.state() is AgentState.SWAPPING
 
 
 def test_who_was_lost_on_its_way_blocks_nothing(script: Script) -> None:
@@ -222,7 +222,7 @@ def test_who_was_lost_on_its_way_blocks_nothing(script: Script) -> None:
     agent.lose("u1", 30.0)
     agent.arrive(50.0)
 
-    assert agent.state is AgentState.SWAPPING
+    assert agent.state() is AgentState.SWAPPING
 
 
 def test_without_a_slot_it_lands_for_good_when_its_battery_is_used_up(script: Script) -> None:
@@ -232,7 +232,7 @@ def test_without_a_slot_it_lands_for_good_when_its_battery_is_used_up(script: Sc
     agent.arrive(50.0)
 
     agent.run_until(BUDGET_S - 0.1)
-    assert agent.state is AgentState.ABOVE_BASE
+    assert agent.state() is AgentState.ABOVE_BASE
     agent.run_until(BUDGET_S)
 
     assert agent.way_home.land
@@ -253,7 +253,7 @@ def test_a_base_that_a_zone_cuts_off_is_given_up(script: Script, above: bool) ->
     agent.drawn(square("new", 50.0, 0.0), 51.0)
 
     # Out of the zone by the shortest way, or not into it.
-    assert agent.state is AgentState.IDLE
+    assert agent.state() is AgentState.IDLE
     assert agent.flight.position_enu_m != ABOVE_BASE
     assert not inside(agent.flight.position_enu_m, 50.0, 0.0)
 
@@ -269,13 +269,13 @@ def test_a_vehicle_that_will_not_land_leaves_the_base_alone_for_a_while(script: 
 
     claim = agent.claim
     assert claim is not None
-    assert agent.state is AgentState.IDLE
+    assert agent.state() is AgentState.IDLE
     assert (claim.phase, claim.base, claim.sortie_end_s) == (ClaimPhase.IDLE, None, BUDGET_S)
     script.items = ["base:b0"]
     agent.run_until(51.0 + agent.timing.reconsider_s - 0.1)
-    assert agent.state is AgentState.IDLE
+    assert agent.state() is AgentState.IDLE
     agent.run_until(51.0 + agent.timing.reconsider_s)
-    assert agent.state is AgentState.FLYING_TO_BASE
+    assert agent.state() is AgentState.FLYING_TO_BASE
 
 
 def test_a_vehicle_that_will_not_take_off_stands_there_still(script: Script) -> None:
@@ -285,10 +285,10 @@ def test_a_vehicle_that_will_not_take_off_stands_there_still(script: Script) -> 
 
     agent.happen(Refused(agent.flight, "not armable"), 71.0)
 
-    assert (agent.state, agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+    assert (agent.state(), agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
     assert isinstance(agent.last_order, Swap)
     agent.get_full(72.0)
-    assert agent.state is AgentState.READY_ON_GROUND
+    assert agent.state() is AgentState.READY_ON_GROUND
     assert script.turns[-1].excluded == {"t0"}
 
 
@@ -298,7 +298,7 @@ def test_it_may_fly_from_base_to_base(script: Script) -> None:
 
     agent.get_full(70.0)
 
-    assert agent.state is AgentState.FLYING_TO_BASE
+    assert agent.state() is AgentState.FLYING_TO_BASE
     claim = agent.claim
     assert claim is not None
     assert (claim.base, claim.stage) == ("b1", BaseStage.APPROACHING)
@@ -324,7 +324,7 @@ def test_held_in_the_air_it_gives_the_base_up_and_decides_anew_afterwards(
     assert claim is not None
     assert (claim.phase, claim.base, claim.sortie_end_s) == (ClaimPhase.PAUSED, None, BUDGET_S)
     agent.told(CommandKind.RESUME, 60.0)
-    assert agent.state is AgentState.PREPARING
+    assert agent.state() is AgentState.PREPARING
 
 
 def test_held_at_a_base_it_stays_there_and_goes_on_from_there(script: Script) -> None:
@@ -336,10 +336,10 @@ def test_held_at_a_base_it_stays_there_and_goes_on_from_there(script: Script) ->
     assert claim is not None
     assert (claim.phase, claim.base, claim.stage) == (ClaimPhase.PAUSED, "b0", BaseStage.LANDED)
     agent.told(CommandKind.RESUME, 60.0)
-    assert agent.state is AgentState.SWAPPING
+    assert agent.state() is AgentState.SWAPPING
     assert isinstance(agent.last_order, Swap)
     agent.get_full(80.0)
-    assert agent.state is AgentState.READY_ON_GROUND
+    assert agent.state() is AgentState.READY_ON_GROUND
 
 
 def test_a_hold_long_enough_to_use_the_battery_up_ends_with_the_way_home(script: Script) -> None:
@@ -349,10 +349,10 @@ def test_a_hold_long_enough_to_use_the_battery_up_ends_with_the_way_home(script:
 
     # The own start is 20 m away, the base 30 m.
     agent.run_until(BUDGET_S - 20.0 - agent.timing.patience_s - 0.1)
-    assert agent.state is AgentState.PAUSED
+    assert agent.state() is AgentState.PAUSED
     agent.run_until(BUDGET_S - 20.0)
 
-    assert agent.state is AgentState.RETURNING_VIA_START
+    assert agent.state() is AgentState.RETURNING_VIA_START
     assert agent.way_home.via_enu_m == ABOVE_START
     assert not agent.way_home.land
 
@@ -376,12 +376,12 @@ def test_started_again_on_its_way_it_flies_on_to_the_base(script: Script) -> Non
     agent = on_its_way(script)
     agent.run_until(10.0)
     life = agent.next_life()
-    assert life.state is AgentState.PREPARING
+    assert life.state() is AgentState.PREPARING
     life.be_at((12.0, 0.0, 10.0), None)
 
     life.happen_ready()
 
-    assert life.state is AgentState.FLYING_TO_BASE
+    assert life.state() is AgentState.FLYING_TO_BASE
     assert life.flight.position_enu_m == ABOVE_BASE
     claim = life.claim
     assert claim is not None
@@ -403,11 +403,11 @@ def test_started_again_while_it_waits_it_keeps_its_place(script: Script) -> None
 
     life.arrive(63.0)
 
-    assert (life.state, life.stage) == (AgentState.ABOVE_BASE, BaseStage.WAITING)
+    assert (life.state(), life.stage) == (AgentState.ABOVE_BASE, BaseStage.WAITING)
     assert life.claim is not None
     assert life.claim.arrives_s == 50.0
     life.hear("u1", visiting(BaseStage.PARKED, 5.0), 70.0)
-    assert life.state is AgentState.SWAPPING
+    assert life.state() is AgentState.SWAPPING
 
 
 @pytest.mark.parametrize("full", [False, True])
@@ -417,11 +417,11 @@ def test_started_again_on_the_ground_it_stays_there(script: Script, full: bool) 
         agent.get_full(70.0)
     life = agent.next_life()
 
-    assert life.state is AgentState.SWAPPING
+    assert life.state() is AgentState.SWAPPING
     assert [type(order) for order in orders(life.log)] == [Swap]
     assert life.stage is (BaseStage.PARKED if full else BaseStage.LANDED)
     life.get_full(80.0)
-    assert life.state is AgentState.READY_ON_GROUND
+    assert life.state() is AgentState.READY_ON_GROUND
 
 
 def test_started_again_before_it_departs_it_decides_anew_from_the_ground(script: Script) -> None:
@@ -434,12 +434,12 @@ def test_started_again_before_it_departs_it_decides_anew_from_the_ground(script:
     agent.touch_down(50.0)
     agent.get_full(70.0)
     life = agent.next_life()
-    assert life.state is AgentState.SWAPPING
+    assert life.state() is AgentState.SWAPPING
     script.items = ["t0"]
 
     life.get_full(73.0)
 
-    assert life.state is AgentState.DEPARTING
+    assert life.state() is AgentState.DEPARTING
     assert life.task == "t0"
 
 

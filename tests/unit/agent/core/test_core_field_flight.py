@@ -30,11 +30,11 @@ LINE = ((100.0, 0.0, 0.0), (100.0, 20.0, 0.0), (100.0, 50.0, 0.0))
 def flying(script: Script, item: str = "t0", **task: object) -> FieldAgent:
     """It has just set off for `t0`, 100 m away and 5 s long, at mission time 0."""
     agent = FieldAgent(bases=[FAR_BASE])
-    agent.fly_to(entry("t0", 100.0, **{"service_s": 5.0, **task}))
+    agent.fly_to(replace(entry("t0", 100.0, service_s=5.0), **task))  # type: ignore[arg-type]
     agent.be_at((0.0, 0.0, 10.0), None)
     script.items = [item]
     agent.start_mission()
-    assert agent.state is AgentState.FLYING
+    assert agent.state() is AgentState.FLYING
     return agent
 
 
@@ -77,7 +77,7 @@ def test_it_waits_at_its_task_until_that_opens(script: Script) -> None:
     agent.arrive(100.0)
 
     agent.run_until(154.9)
-    assert agent.state is AgentState.SERVING
+    assert agent.state() is AgentState.SERVING
     agent.run_until(155.0)
     assert (agent.outcome.result, agent.outcome.completed_s) == (AttemptResult.DONE, 155.0)
 
@@ -88,15 +88,15 @@ def test_it_waits_at_its_task_until_that_opens(script: Script) -> None:
 def test_who_comes_too_late_does_not_begin(
     script: Script, limits: dict[str, float], in_time_s: float
 ) -> None:
-    agent = flying(script, **limits)
+    agent = flying(script, "t0", **limits)
     agent.run_until(99.0)
     agent.arrive(in_time_s)
-    assert agent.state is AgentState.SERVING
+    assert agent.state() is AgentState.SERVING
 
-    late = flying(script, **limits)
+    late = flying(script, "t0", **limits)
     late.run_until(in_time_s + 0.01)
 
-    assert late.state is AgentState.IDLE
+    assert late.state() is AgentState.IDLE
     assert "released" in notes(late.log)
 
 
@@ -136,7 +136,7 @@ def test_late_news_of_the_way_to_a_line_is_not_its_end(script: Script) -> None:
     agent.happen(Arrived(to_line), 101.0)
     agent.run_until(120.0)
 
-    assert agent.state is AgentState.SERVING
+    assert agent.state() is AgentState.SERVING
 
 
 def test_a_task_with_its_own_height_is_flown_there(script: Script) -> None:
@@ -181,7 +181,7 @@ def test_an_idle_one_leaves_a_zone_that_is_drawn_over_it(script: Script) -> None
     agent = flying(script)
     agent.post(entry("t0", 100.0, service_s=5.0, withdrawn=True))
     agent.be_at((46.0, 0.0, 10.0), None, 46.0)
-    assert agent.state is AgentState.IDLE
+    assert agent.state() is AgentState.IDLE
 
     agent.drawn(WALL, 46.0)
 
@@ -198,7 +198,7 @@ def test_a_task_in_a_new_zone_is_released(script: Script, there: bool) -> None:
 
     agent.drawn(square("new", 100.0, 0.0), 101.0)
 
-    assert agent.state is AgentState.IDLE
+    assert agent.state() is AgentState.IDLE
     assert agent.phase is ClaimPhase.IDLE
 
 
@@ -223,12 +223,12 @@ def test_a_battery_that_drains_faster_ends_the_sortie_earlier(script: Script) ->
 def test_a_task_that_the_battery_does_not_last_for_is_given_up(script: Script) -> None:
     agent = flying(script)
     agent.be_at((50.0, 0.0, 10.0), 0.9, 50.0)
-    assert agent.state is AgentState.FLYING
+    assert agent.state() is AgentState.FLYING
 
     # 55 s to the end of the task and 100 s home to its start: 155 s, but 0.3 of 500 s are left.
     agent.be_at((50.0, 0.0, 10.0), 0.5, 50.0)
 
-    assert agent.state is AgentState.IDLE
+    assert agent.state() is AgentState.IDLE
     assert script.turns[-1].sortie_end_s == pytest.approx(200.0)
 
 
@@ -239,18 +239,18 @@ def test_with_nothing_to_do_it_goes_to_the_nearest_base_in_time(script: Script) 
     agent.start_mission()
     agent.run_until(39.0)
     agent.arrive(40.0)
-    assert agent.state is AgentState.IDLE
+    assert agent.state() is AgentState.IDLE
 
     agent.run_until(BUDGET_S - 10.0 - agent.timing.patience_s - 0.1)
-    assert agent.state is AgentState.IDLE
+    assert agent.state() is AgentState.IDLE
     agent.run_until(BUDGET_S - 10.0)
 
-    assert agent.state is AgentState.FLYING_TO_BASE
+    assert agent.state() is AgentState.FLYING_TO_BASE
     claim = agent.claim
     assert claim is not None
     assert (claim.base, claim.stage) == ("b0", BaseStage.APPROACHING)
     agent.arrive(BUDGET_S)
-    assert agent.state is AgentState.SWAPPING
+    assert agent.state() is AgentState.SWAPPING
 
 
 def test_with_nothing_to_do_it_goes_to_its_start_for_good_if_that_is_nearest(
@@ -265,7 +265,7 @@ def test_with_nothing_to_do_it_goes_to_its_start_for_good_if_that_is_nearest(
 
     agent.run_until(BUDGET_S - 40.0)
 
-    assert agent.state is AgentState.RETURNING_VIA_START
+    assert agent.state() is AgentState.RETURNING_VIA_START
     assert agent.way_home.via_enu_m == ABOVE_START
     assert not agent.way_home.land
     assert agent.phase is ClaimPhase.OUT
@@ -294,7 +294,7 @@ def test_every_way_home_leads_round_zones_to_the_nearest_base(script: Script, wh
     home = agent.way_home
     assert home.land
     assert home.via_enu_m == (50.0, 0.0, 10.0)
-    assert {abs(north_m) for _, north_m, _ in home.path_enu_m} == {5.0}
+    assert {abs(corner[1]) for corner in home.path_enu_m} == {5.0}
 
 
 def test_a_zone_drawn_on_the_way_home_is_flown_round(script: Script) -> None:
@@ -306,7 +306,7 @@ def test_a_zone_drawn_on_the_way_home_is_flown_round(script: Script) -> None:
     agent.drawn(WALL, 92.0)
 
     assert agent.way_home.via_enu_m == ABOVE_START
-    assert {abs(north_m) for _, north_m, _ in agent.way_home.path_enu_m} == {5.0}
+    assert {abs(corner[1]) for corner in agent.way_home.path_enu_m} == {5.0}
 
 
 def test_a_vehicle_that_flies_no_corners_home_returns_by_its_own_way(script: Script) -> None:
@@ -318,7 +318,7 @@ def test_a_vehicle_that_flies_no_corners_home_returns_by_its_own_way(script: Scr
     agent.happen(Refused(agent.way_home, "no corners"), 93.0)
 
     assert agent.way_home == Return("over", False)
-    assert agent.state is AgentState.RETURNING_VIA_START
+    assert agent.state() is AgentState.RETURNING_VIA_START
 
 
 def test_a_resumed_line_is_flown_in_the_direction_claimed(script: Script) -> None:
@@ -328,7 +328,7 @@ def test_a_resumed_line_is_flown_in_the_direction_claimed(script: Script) -> Non
     life.be_at((12.0, 6.0, 10.0), None)
     life.happen_ready()
 
-    assert life.state is AgentState.FLYING
+    assert life.state() is AgentState.FLYING
     assert life.flight.position_enu_m == (100.0, 50.0, 10.0)
     assert life.claim == replace(claims(agent.log)[-1], phase=ClaimPhase.HELD)
     assert len([order for order in orders(life.log) if isinstance(order, GoTo)]) == 1

@@ -54,7 +54,8 @@ class FieldStorm(Storm):
     def event(self) -> Event:
         if self.rng.random() < 0.02:
             half_m = float(self.rng.uniform(0.2, 1.5))
-            zone = square("z", *map(float, self.rng.uniform(0.0, 9.0, 2)), half_m)
+            east_m, north_m = map(float, self.rng.uniform(0.0, 9.0, 2))
+            zone = square("z", east_m, north_m, half_m)
             withdrawn = bool(self.rng.random() < 0.5)
             return self.heard(OPERATOR, ZoneEdit(zone, withdrawn, self.brief.run, ""))
         if self.rng.random() < 0.02:
