@@ -301,7 +301,7 @@ def test_a_zone_drawn_on_the_way_home_is_flown_round(script: Script) -> None:
     agent = flying(script)
     agent.be_at((100.0, 0.0, 10.0), None, 90.0)
     agent.end_mission(91.0)
-    assert agent.way_home.path_enu_m == ()
+    assert not agent.way_home.path_enu_m
 
     agent.drawn(WALL, 92.0)
 
