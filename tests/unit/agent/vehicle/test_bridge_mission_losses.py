@@ -21,6 +21,17 @@ _MESSAGES = 15
 _SHAPES = {FakeCopter: [178, 222, 92, 16, 20], FakePx4: [178, 16, 20]}
 
 
+def _every_second(first: int) -> list[object]:
+    """Every message of an upload, of which every second from ``first`` on is lost by day."""
+    return [
+        index if index % 2 == first else pytest.param(index, marks=pytest.mark.slow)
+        for index in range(_MESSAGES)
+    ]
+
+
+EVEN_BY_DAY, ODD_BY_DAY = _every_second(0), _every_second(1)
+
+
 class Cut:
     """Loses one mission message, or everything from it on."""
 
@@ -71,7 +82,7 @@ def keeps(flight: BridgeFlight, target: tuple[float, float, float]) -> bool:
 
 
 @pytest.mark.parametrize("up", [True, False], ids=["to the vehicle", "from it"])
-@pytest.mark.parametrize("index", range(_MESSAGES))
+@pytest.mark.parametrize("index", EVEN_BY_DAY)
 def test_one_lost_message_only_delays(fake: type[FakeCopter], index: int, *, up: bool) -> None:
     flight = under_way(fake)
     cut = Cut(index, forever=False)
@@ -84,7 +95,7 @@ def test_one_lost_message_only_delays(fake: type[FakeCopter], index: int, *, up:
     assert flight.reports == [Arrived(2)]
 
 
-@pytest.mark.parametrize("index", range(_MESSAGES))
+@pytest.mark.parametrize("index", ODD_BY_DAY)
 def test_vehicle_that_hears_nothing_more_flies_one_target_or_the_other_and_then_home(
     fake: type[FakeCopter], index: int
 ) -> None:
@@ -104,7 +115,7 @@ def test_vehicle_that_hears_nothing_more_flies_one_target_or_the_other_and_then_
     assert not any(r == Arrived(1) for r in flight.reports)
 
 
-@pytest.mark.parametrize("index", range(_MESSAGES))
+@pytest.mark.parametrize("index", EVEN_BY_DAY)
 def test_vehicle_that_is_heard_no_more_is_handed_over(fake: type[FakeCopter], index: int) -> None:
     flight = under_way(fake)
     flight.to_bridge = Cut(index, forever=True)
@@ -114,7 +125,7 @@ def test_vehicle_that_is_heard_no_more_is_handed_over(fake: type[FakeCopter], in
         assert flight.reports[-1] == HandedOver("nothing heard for 5 s")
 
 
-@pytest.mark.parametrize("index", range(_MESSAGES))
+@pytest.mark.parametrize("index", ODD_BY_DAY)
 def test_outage_of_the_missions_alone_keeps_or_restores_the_old_target(
     fake: type[FakeCopter], index: int
 ) -> None:
