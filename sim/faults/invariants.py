@@ -261,7 +261,7 @@ class InvariantChecker:
             if task.id in settled or (message_log.ended and unheard):
                 continue
             able = [
-                uav.id
+                str(uav.id)
                 for uav in home
                 if world.mission.success(uav, task) > 0.0
                 and task.id in to_do.get(uav.id, ())
