@@ -160,7 +160,7 @@ def ready(
     speedup: SpeedupOption = 1.0,
     json: JsonOption = False,
 ) -> int:
-    """Say that a UAV at a base has its new battery and may start again.
+    """Say that a UAV at a base has a new battery and may start.
 
     A real vehicle that has landed to swap stays disarmed until a person has said so. Of a UAV that
     is lost it says that its slot is free again. It counts once: after the next swap it is to be
