@@ -155,14 +155,8 @@ class Uncertainty:
             place = rng.uniform(low, high)
             name = TaskId(f"popup{number}")
             like[name] = model
-            tasks.append(
-                replace(
-                    model,
-                    id=name,
-                    position_enu_m=(float(place[0]), float(place[1]), model.position_enu_m[2]),
-                    appears_s=when_s,
-                )
-            )
+            moved = _moved(model, float(place[0]), float(place[1]))
+            tasks.append(replace(moved, id=name, appears_s=when_s))
         uavs = tuple(
             replace(
                 uav,
@@ -323,6 +317,16 @@ def _poisson_s(rng: np.random.Generator, rate_per_min: float, span_s: float) -> 
             times_s.append(time_s)
             time_s += float(rng.exponential(60.0 / rate_per_min))
     return times_s
+
+
+def _moved(task: Task, east_m: float, north_m: float) -> Task:
+    """``task`` at another place; a line with all of its points, so that it stays as it is."""
+    place_m = east_m, north_m, task.position_enu_m[2]
+    off_m = east_m - task.position_enu_m[0], north_m - task.position_enu_m[1]
+    # The first point is the place itself, to the last bit.
+    path_m = tuple((e_m + off_m[0], n_m + off_m[1], up_m) for e_m, n_m, up_m in task.path_enu_m[1:])
+    path_m = (place_m, *path_m) if task.path_enu_m else ()
+    return replace(task, position_enu_m=place_m, path_enu_m=path_m)
 
 
 def _as_of(table: Mapping[str, float], like: Mapping[str, Task]) -> Mapping[str, float]:

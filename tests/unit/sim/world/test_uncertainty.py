@@ -38,6 +38,22 @@ def test_same_seed_draws_the_same_world(valley: Mission) -> None:
     assert (one.mission, one.lost_at_s) != (other.mission, other.lost_at_s)
 
 
+def test_tasks_that_are_like_a_line_are_lines_at_another_place(valley: Mission) -> None:
+    path = ((0.1, 0.2, 3.0), (10.3, 20.7, 4.0), (40.0, -5.0, 5.0))
+    line = replace(valley.tasks[0], position_enu_m=path[0], path_enu_m=path)
+
+    drawn = Uncertainty(popups_per_min=6.0).draw(
+        replace(valley, tasks=(line, *valley.tasks[1:2])), 100.0, 3
+    )
+
+    places = [task for task in drawn.mission.tasks[2:] if task.path_enu_m]
+    assert places
+    for task in places:
+        assert task.path_enu_m[0] == task.position_enu_m != path[0]
+        moved = np.subtract(task.path_enu_m, task.path_enu_m[0])
+        assert moved == pytest.approx(np.subtract(path, path[0]))
+
+
 def test_losses_do_not_change_which_tasks_pop_up(valley: Mission) -> None:
     calm = Uncertainty(popup=0.3).draw(valley, 100.0, 11)
     rough = Uncertainty(loss=1.0, popup=0.3).draw(valley, 100.0, 11)
