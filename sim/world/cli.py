@@ -91,14 +91,20 @@ def simulate(
         remedy = "name a scenario, such as table-1, or a recording with --from"
         raise InputError(Fault("swarm simulate", "", "nothing to simulate", remedy))
 
+    from coordinator.core.publication import unsayable
     from coordinator.terminal.report import MissionReport
     from sim.world.simulation import recording_simulation, simulate_mission
     from sim.world.uncertainty import Uncertainty
+    from swarm.model.layers import FlightLayers
     from swarm.scenario import load_scenario
 
     check_flight(method, report, record)
     uncertainty = chance.changed(Uncertainty())
     mission = with_reattempts(load_scenario(scenario), reattempt=chance.reattempt)
+    remedy = "leave some out, or make several of it"
+    lines = unsayable(mission, FlightLayers())
+    if complaints := [Fault(str(scenario), "", what, remedy) for what in lines]:
+        raise InputError(*complaints)
     if faults is not None:
         if record is not None:
             problem, remedy = "does not go with --faults", "leave one of them out"

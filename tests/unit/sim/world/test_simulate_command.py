@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import inspect
 import json
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -91,6 +92,23 @@ def test_a_mission_of_which_nobody_hears_is_broken_off_and_said_so(
 def test_numbers_out_of_range_are_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["simulate", "table-1", "--message-loss", "1.5"]) == 2
     assert "--message-loss" in capsys.readouterr().err
+
+
+def test_a_line_that_no_message_has_room_for_is_refused_before_anybody_flies(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = [[0.1 + n, 0.2] for n in range(400)]
+    scenario = tmp_path / "long.toml"
+    scenario.write_text(
+        'schema = 2\nname = "long"\n[mission]\nhorizon_s = 900\n'
+        '[[uav]]\nid = "u0"\nposition_m = [0, 0]\nspeed_m_s = 10\n'
+        f'[[task]]\nid = "t0"\nvalue = 1\npath_m = {path}\n'
+    )
+
+    assert main(["simulate", str(scenario)]) == 2
+
+    (complaint,) = capsys.readouterr().err.splitlines()
+    assert "the line of task t0 has 400 points" in complaint
 
 
 def test_every_option_of_uncertainty_can_be_asked_for() -> None:
