@@ -66,14 +66,18 @@ class FieldNetwork:
         self._band_m = mission.band_m
         self._airspace = Airspace(mission.zones, mission.zone_margin_m)
         self.node_enu_m, self.enter, self._in_layer = _nodes(uavs, mission.bases, tasks)
+        self._lines = _Lines(tasks)
         networks: dict[bytes, LegNetwork] = {}
         kinds: dict[tuple[FlightModel, bytes], int] = {}
         kind = []
         self._kinds: list[tuple[FlightModel, LegNetwork]] = []
         for uav, layer_m in zip(uavs, self._layers_m, strict=True):
             model = flight_model(uav, mission.wind_enu_m_s)
-            low_m, high_m = self._heights_m(layer_m)
+            low_m, high_m = self._heights_m(layer_m, self.node_enu_m, self._in_layer)
             sides = self._sides(low_m, high_m)
+            # What lies between the ends of lines may be higher than both.
+            line_m, in_layer = self._lines.point_m, self._lines.in_layer
+            sides += self._sides(*self._heights_m(layer_m, line_m, in_layer))
             if sides not in networks:
                 networks[sides] = LegNetwork(self._airspace, self.node_enu_m, low_m, high_m)
             if (model, sides) not in kinds:
@@ -87,9 +91,12 @@ class FieldNetwork:
         self.leg_s: FloatArray = self._leg_s()
         """(n_kind, n_node, n_node) times of legs [s]."""
         self.line_s: FloatArray = np.zeros((len(kinds), len(tasks), 2))
-        """(n_kind, n_task, 2) times along lines, forwards and backwards [s]."""
+        """(n_kind, n_task, 2) times along lines, forwards and backwards [s]; infinite: through
+        zones."""
         for row, (model, _) in enumerate(self._kinds):
             _add_lines_s(model, tasks, self.line_s[row])
+            if self._airspace.zones:
+                self.line_s[row, self._cut_off(self._layers_m[kind.index(row)])] = np.inf
         self.home_s, self.home = self._homes(len(mission.bases))
 
     def legs_from_s(
@@ -160,14 +167,30 @@ class FieldNetwork:
         height_m = float(place_m[0, 2]) + self._layers_m[uav] if flown_m is None else flown_m
         return place_m, height_m, height_m
 
-    def _heights_m(self, layer_m: float) -> tuple[FloatArray, FloatArray]:
-        """(n_node,) lowest and greatest heights that a UAV may use there [m above the origin]."""
-        up_m = self.node_enu_m[:, 2]
+    def _heights_m(
+        self, layer_m: float, place_m: FloatArray, in_layer: npt.NDArray[np.bool_]
+    ) -> tuple[FloatArray, FloatArray]:
+        """(n,) lowest and greatest heights that a UAV may use at places [m above the origin]."""
+        up_m = place_m[:, 2]
         if self._band_m is not None:
             low_m, high_m = self._band_m
             return np.full_like(up_m, low_m), np.full_like(up_m, high_m)
-        flown_m = np.where(self._in_layer, up_m + layer_m, up_m)
+        flown_m = np.where(in_layer, up_m + layer_m, up_m)
         return flown_m, flown_m
+
+    def _cut_off(self, layer_m: float) -> IntArray:
+        """Columns of the lines that lead through a zone which concerns who flies in that layer."""
+        lines = self._lines
+        low_m, high_m = self._heights_m(layer_m, lines.point_m, lines.in_layer)
+        low_m = np.minimum(low_m[lines.piece], low_m[lines.piece + 1])
+        high_m = np.maximum(high_m[lines.piece], high_m[lines.piece + 1])
+        cut = np.zeros(len(lines.piece), dtype=np.bool_)
+        for bounds_m in sorted(set(zip(low_m.tolist(), high_m.tolist(), strict=True))):
+            alike = (low_m == bounds_m[0]) & (high_m == bounds_m[1])
+            ends_m = lines.point_m[lines.piece[alike]], lines.point_m[lines.piece[alike] + 1]
+            planner = self._airspace.concerning(*bounds_m)
+            cut[alike] = ~planner.clear(ends_m[0][:, :2], ends_m[1][:, :2])
+        return np.unique(lines.column[lines.piece[cut]])
 
     def _sides(self, low_m: FloatArray, high_m: FloatArray) -> bytes:
         """On which sides of all zones' floors and ceilings the nodes lie."""
@@ -226,6 +249,23 @@ def _nodes(
         np.array(enter, dtype=np.int32).reshape(-1, 2),
         np.array(in_layer, dtype=np.bool_),
     )
+
+
+class _Lines:
+    """The lines among tasks, point by point."""
+
+    def __init__(self, tasks: Sequence[Task]) -> None:
+        lines = [(column, task) for column, task in enumerate(tasks) if task.path_enu_m]
+        column = [each for each, task in lines for _ in task.path_enu_m]
+        points = [point for _, task in lines for point in _points(task)]
+        self.column: IntArray = np.array(column, dtype=np.int32)
+        """(k,) whose point it is."""
+        self.point_m: FloatArray = np.array(points, dtype=np.float64).reshape(-1, 3)
+        """(k, 3) places [m; ENU], heights as the mission gives them."""
+        self.in_layer = np.array([tasks[each].height_m is None for each in column], dtype=np.bool_)
+        """(k,) whether UAVs keep to their layers there."""
+        self.piece: IntArray = np.flatnonzero(np.diff(self.column) == 0).astype(np.int32)
+        """First points of straight pieces."""
 
 
 def _points(task: Task) -> list[tuple[float, float, float]]:

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from swarm.allocation.field import FieldProblem, FieldState
-from swarm.model import Mission, Uav
+from swarm.model import Mission, Task, TaskId, Uav, UavId, Zone, ZoneId
 from tests.support.field_missions import mission_of
 from tests.support.field_oracle.flight import FlightTimes
 from tests.support.field_oracle.made_up import KINDS, made_up
@@ -179,3 +179,25 @@ def test_one_layer_for_each_uav() -> None:
 
     with pytest.raises(ValueError, match="a height for each of 2 UAVs"):
         FieldProblem.from_mission(mission, layers_m=[10.0])
+
+
+@pytest.mark.parametrize(("ceiling_m", "cut"), [(None, (True, True)), (12.0, (True, False))])
+def test_lines_through_zones_cannot_be_flown_by_whom_these_concern(
+    ceiling_m: float | None, cut: tuple[bool, bool]
+) -> None:
+    path = ((0.0, 0.0, 0.0), (100.0, 0.0, 0.0))
+    lines = [
+        Task(TaskId("through"), path[0], 1.0, path_enu_m=path),
+        Task(TaskId("round"), path[0], 1.0, path_enu_m=(path[0], (50.0, 30.0, 0.0), path[1])),
+        Task(TaskId("bent"), (50.0, -30.0, 0.0), 1.0, path_enu_m=((50.0, -30.0, 0.0), *path[::-1])),
+    ]
+    ring = ((40.0, -5.0), (60.0, -5.0), (60.0, 5.0), (40.0, 5.0))
+    uavs = tuple(Uav(UavId(f"u{n}"), (-10.0, 0.0, 0.0), 10.0) for n in range(2))
+    zones = (Zone(ZoneId("z"), ring, ceiling_m=ceiling_m),)
+
+    problem = FieldProblem.from_mission(Mission("cut", 900.0, uavs, tuple(lines), zones=zones))
+
+    for row, through in enumerate(cut):
+        line_s = problem.line_s[problem.kind[row]]
+        assert np.isinf(line_s[0]).all() == np.isinf(line_s[2]).all() == through
+        assert np.isfinite(line_s[1]).all()
