@@ -35,10 +35,12 @@ class BaseVisit:
     """When it has waited for as long as others may object."""
     waited: bool = False
     """Whether it has."""
+    hopeless_at_s: float | None = None
+    """When it has stood beside slots for long enough that are all blocked."""
 
     def next_deadline_s(self) -> float | None:
         """When any of that is due."""
-        return earliest(self.held_at_s, self.waited_at_s)
+        return earliest(self.held_at_s, self.waited_at_s, self.hopeless_at_s)
 
 
 class BaseVisits(AgentPart):
@@ -110,7 +112,14 @@ class BaseVisits(AgentPart):
         # Who is gone for good needs no slot, unless somebody else has the vehicle there.
         leaves = claim.phase is ClaimPhase.OUT and not claim.handed_over
         stage = BaseStage.PARKED if leaves else before.stage
-        return replace(claim, base=base, stage=stage)
+        used_up_s = before.sortie_end_s if before.stage is BaseStage.PARKED else None
+        return replace(claim, base=base, stage=stage, sortie_end_s=used_up_s)
+
+    def is_hopeless(self, now_s: float) -> bool:
+        """Whether it stands at a base at which it would wait for a slot for ever."""
+        hopeless_at_s = self._visit.hopeless_at_s
+        beside = self._machine.state is AgentState.BESIDE_SLOTS
+        return beside and hopeless_at_s is not None and hopeless_at_s <= now_s
 
     def next_deadline_s(self) -> float | None:
         """When `advance` will next have something to do."""
@@ -205,6 +214,9 @@ class BaseVisits(AgentPart):
         if visit.waited_at_s is not None and visit.waited_at_s <= now_s:
             visit.waited_at_s, visit.waited = None, True
         base = self._base()
+        if self._machine.state is AgentState.BESIDE_SLOTS and base is not None:
+            self._wait_on_ground(base, now_s)
+            return
         on_slot = self._machine.state is AgentState.SWAPPING
         if base is None or (not on_slot and self.is_blocked(base)):
             self.break_off("the base is gone" if base is None else "its slots are blocked", now_s)
@@ -242,21 +254,54 @@ class BaseVisits(AgentPart):
         everybody = claims, self.blocking()
         if bases.may_land(self._uav, base.id, base.slots, *everybody, waited=visit.waited):
             self._land(base, claim, now_s)
-        elif claim.stage is not BaseStage.WAITING and claim.phase is ClaimPhase.HELD:
+        elif claim.stage is BaseStage.APPROACHING and claim.phase is ClaimPhase.HELD:
             visit.waited_at_s = now_s + self._timing.objection_window_s
             self._announcer.explain(f"waits for a slot of base {base.id}")
             self._say(replace(claim, stage=BaseStage.WAITING))
             self._log("waits for a slot", base=base.id)
 
     def _land(self, base: BaseSpec, claim: Claim, now_s: float) -> None:
+        self._visit, self._on_ground = BaseVisit(), self._machine.state in AT_BASE
         self._machine.take(Trigger.SLOT_FREE)
-        self._visit, self._on_ground = BaseVisit(), False
         ready_s = self._mission_view.mission_s(now_s) + base.swap_s
         self._announcer.explain(f"swaps its battery at base {base.id}")
         self._flights.swap(base)
         held = replace(claim, phase=ClaimPhase.HELD, completion_s=ready_s)
         self._say(replace(held, stage=BaseStage.LANDED))
         self._log("lands", base=base.id)
+
+    def come_down(self, now_s: float) -> None:
+        """The battery is used up: land beside the slots, and wait there for one."""
+        claim, base = self.claim, self._base()
+        if claim is not None and base is not None and self._machine.take(Trigger.COMES_DOWN):
+            self._flights.land_beside(base)
+            end_s = self._mission_view.mission_s(now_s)
+            ends_s = claim.sortie_end_s
+            self._wait_beside(base, replace(claim, sortie_end_s=ends_s or end_s), now_s)
+            self._log("lands beside the slots", base=base.id)
+
+    def _wait_beside(self, base: BaseSpec, claim: Claim, now_s: float) -> None:
+        """Say that it stands there with a battery that is used up, which its sortie's end tells."""
+        self._on_ground = True
+        self._visit = BaseVisit(waited_at_s=now_s + self._timing.objection_window_s)
+        self._sortie.land()
+        self._mission_view.stand(base.position_enu_m)
+        self._announcer.explain(f"waits beside the slots of base {base.id}")
+        free_s = [
+            each.completion_s
+            for each in self._replica.claims.values()
+            if each.base == base.id and bases.holds_slot(each)
+        ]
+        ready_s = max([self._mission_view.mission_s(now_s), *free_s]) + base.swap_s
+        held = replace(claim, phase=ClaimPhase.HELD, completion_s=ready_s)
+        self._say(replace(held, stage=BaseStage.PARKED))
+
+    def _wait_on_ground(self, base: BaseSpec, now_s: float) -> None:
+        if not self.is_blocked(base):
+            self._visit.hopeless_at_s = None
+            self._land_or_wait(base, now_s)
+        elif self._visit.hopeless_at_s is None:
+            self._visit.hopeless_at_s = now_s + self._timing.stalemate_s
 
     def stand(self, now_s: float) -> bool:
         """The vehicle stands at a base already: have its battery looked after from there.
@@ -268,7 +313,11 @@ class BaseVisits(AgentPart):
             return False
         if not self._machine.take(Trigger.STANDS_AT_BASE):
             return False
-        self._stay(base, claim.stage, now_s)
+        if claim.stage is BaseStage.PARKED and claim.sortie_end_s is not None:
+            self._machine.take(Trigger.COMES_DOWN)
+            self._wait_beside(base, claim, now_s)
+        else:
+            self._stay(base, claim.stage, now_s)
         return True
 
     def stay(self, base: BaseSpec, now_s: float) -> None:

@@ -462,6 +462,10 @@ class FieldTasking(Tasking):
         self._home_at_s = self._limits.leaves_at_s(self.stands_at is not None, now_s)
         if self._home_at_s is None or self._home_at_s > now_s:
             return
+        if self._machine.state is AgentState.ABOVE_BASE:
+            self._home_at_s = None
+            self._visits.come_down(now_s)
+            return
         home, epoch, problem = self._flights.way_home(), self._replica.epoch, self._flights.problem
         if self._machine.state is not AgentState.IDLE or home is None or home.base is None:
             return
@@ -480,6 +484,8 @@ class FieldTasking(Tasking):
         """Why the UAV has to fly home for good: its battery; None if it need not."""
         if self._flights.problem is None:
             return None
+        if self._visits.is_hopeless(now_s):
+            return "its battery is used up, and the slots of its base are blocked"
         if self._machine.state in PAUSED_BY_OPERATOR:  # nothing else looks at the time there
             self._home_at_s = self._limits.leaves_at_s(self.stands_at is not None, now_s)
         if self._home_at_s is None or self._home_at_s > now_s:

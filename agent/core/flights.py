@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from agent.core.context import AgentContext, AgentPart
-from agent.core.interface import GoTo, Swap
+from agent.core.interface import GoTo, Return, Swap
 from swarm.allocation.field import FieldProblem
 from swarm.allocation.field.ways import Way, base_node, task_nodes, way_home, way_to
 from swarm.model import TaskId, UavId
@@ -173,3 +173,10 @@ class Flights(AgentPart):
         """Land at a base, and get another battery."""
         self.leg += 1
         self._order(Swap(self.leg, base.position_enu_m))
+
+    def land_beside(self, base: BaseSpec) -> None:
+        """Land at a base without taking any of its slots."""
+        self.leg += 1  # nothing is heard any more of how it came there
+        above_enu_m = self._mission_view.in_layer(base.position_enu_m)
+        reason = f"its battery is used up, and no slot of base {base.id} is free"
+        self._order(Return(reason, via_enu_m=above_enu_m, land=True))

@@ -29,6 +29,7 @@ class AgentState(Enum):
     SERVING = "is at the task that it claims, until the service is over"
     FLYING_TO_BASE = "flies to the base that it claims"
     ABOVE_BASE = "waits above the base that it claims, until a slot is free"
+    BESIDE_SLOTS = "stands beside the slots of the base that it claims, until one is free"
     SWAPPING = "is on a slot of the base that it claims, until its battery is full"
     READY_ON_GROUND = "stands at a base with a full battery, and is free"
     DEPARTING = "stands at a base until it is to take off for the task that it claims"
@@ -53,7 +54,8 @@ class Trigger(Enum):
     BASE_CHOSEN = "it has chosen a base"
     ARRIVED = "the vehicle is at the task, or above the base"
     SERVED = "the service is over, the attempt done or failed"
-    SLOT_FREE = "the base has a slot for it: it lands"
+    SLOT_FREE = "the base has a slot for it"
+    COMES_DOWN = "its battery is used up, and no slot free: it lands, or stands, beside them"
     SWAPPED = "its battery is full"
     DEPARTED = "it takes off for the task that it claims"
     STANDS_AT_BASE = "it stands at a base still: by an earlier life, a hold, or an order refused"
@@ -118,8 +120,19 @@ TRANSITIONS: Final[Mapping[AgentState, Mapping[Trigger, AgentState]]] = {
         _T.CLAIM_LOST: _S.IDLE,
         _T.STANDS_AT_BASE: _S.SWAPPING,
     },
-    _S.ABOVE_BASE: {**_TAKING_PART, _T.SLOT_FREE: _S.SWAPPING, _T.CLAIM_LOST: _S.IDLE},
-    _S.SWAPPING: {**_TAKING_PART, _T.SWAPPED: _S.READY_ON_GROUND, _T.CLAIM_LOST: _S.IDLE},
+    _S.ABOVE_BASE: {
+        **_TAKING_PART,
+        _T.SLOT_FREE: _S.SWAPPING,
+        _T.COMES_DOWN: _S.BESIDE_SLOTS,
+        _T.CLAIM_LOST: _S.IDLE,
+    },
+    _S.BESIDE_SLOTS: {**_TAKING_PART, _T.SLOT_FREE: _S.SWAPPING},
+    _S.SWAPPING: {
+        **_TAKING_PART,
+        _T.SWAPPED: _S.READY_ON_GROUND,
+        _T.COMES_DOWN: _S.BESIDE_SLOTS,
+        _T.CLAIM_LOST: _S.IDLE,
+    },
     _S.READY_ON_GROUND: {
         **_TAKING_PART,
         _T.DECIDED: _S.DEPARTING,
@@ -180,13 +193,13 @@ TAKES_TARGETS: Final = frozenset(
     }
 )
 """The vehicle is under command and goes where it is sent, at a base from the ground up."""
-AT_BASE: Final = frozenset({_S.SWAPPING, _S.READY_ON_GROUND, _S.DEPARTING})
+AT_BASE: Final = frozenset({_S.BESIDE_SLOTS, _S.SWAPPING, _S.READY_ON_GROUND, _S.DEPARTING})
 """The vehicle is on the ground, or about to touch down."""
-VISITS_BASE: Final = frozenset({_S.FLYING_TO_BASE, _S.ABOVE_BASE, _S.SWAPPING})
+VISITS_BASE: Final = frozenset({_S.FLYING_TO_BASE, _S.ABOVE_BASE, _S.BESIDE_SLOTS, _S.SWAPPING})
 """It stands by a base that it claims, and by no task."""
 FREE: Final = frozenset({_S.WAITING, _S.IDLE, _S.READY_ON_GROUND})
 """It stands by no task; what its claim register names is over, or about to be replaced."""
-TAKES_TASKS: Final = TAKES_TARGETS | {_S.RESUMING, _S.WAITING, _S.SWAPPING}
+TAKES_TASKS: Final = TAKES_TARGETS | {_S.RESUMING, _S.WAITING, _S.BESIDE_SLOTS, _S.SWAPPING}
 """Its claim register is the word of this life; in the other states it tells of the past."""
 PAUSED_BY_OPERATOR: Final = frozenset({_S.PAUSED, _S.PAUSED_HOMEBOUND})
 HEADED_HOME: Final = frozenset({_S.PAUSED_HOMEBOUND, _S.RETURNING_VIA_START, _S.RETURNING})
@@ -204,6 +217,7 @@ STATUS_PHASE: Final[Mapping[AgentState, StatusPhase]] = {
     _S.SERVING: StatusPhase.SERVING,
     _S.FLYING_TO_BASE: StatusPhase.FLYING,
     _S.ABOVE_BASE: StatusPhase.FLYING,
+    _S.BESIDE_SLOTS: StatusPhase.SERVING,
     _S.SWAPPING: StatusPhase.SERVING,
     _S.READY_ON_GROUND: StatusPhase.IDLE,
     _S.DEPARTING: StatusPhase.FLYING,

@@ -67,7 +67,8 @@ class TimeLimits(AgentPart):
         """When the UAV has to head home from where it is, on the own clock; None: never.
 
         Only who stands by nothing in the air has to: other ways home are reckoned with already.
-        Above a base it has nowhere to go, and lands when its sortie ends, slot or not.
+        Above a base it has nowhere to go, and lands when its sortie ends, beside the slots if need
+        be.
         """
         end_s, state = self._sortie.end_s, self._machine.state
         if math.isinf(end_s) or not self._mission_view.running or stands:

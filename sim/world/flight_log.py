@@ -51,6 +51,8 @@ class _OpenLeg:
     arrive_s: float | None = None
     begin_s: float | None = None
     is_reversed: bool = False
+    came: _OpenLeg | None = None
+    """Of who lands where it is, at a base: how it came there."""
 
 
 @dataclass(slots=True)
@@ -140,6 +142,9 @@ class FlightLog:
             case Swap():
                 base = self._base_at(order.position_enu_m)
                 leg = flown.open
+                if leg is not None and leg.came is not None:
+                    leg = flown.open = leg.came  # it has waited beside the slots
+                flown.home = None
                 if base is not None and (leg is None or leg.task is not None):
                     here, there = place_enu_m[:2], order.position_enu_m[:2]
                     leg = flown.open = _OpenLeg(None, 1, now_s, here, [there], order.leg)
@@ -247,6 +252,7 @@ class FlightLog:
         if not order.land and way[-1:] != [start]:
             way.append(start)
         way = way or [place_enu_m[:2]]
+        waits = flown.open if flown.open is not None and flown.open.task is None else None
         base = None if way[-1] == start else self._base_at((*way[-1], 0.0))
         leg = _OpenLeg(None, 1, now_s, place_enu_m[:2], way, -1)
         if (before := flown.open) is not None and before.leg < 0:
@@ -254,6 +260,8 @@ class FlightLog:
             leg.via_m, leg.from_m = [*passed_m, *way], before.from_m
             leg.depart_s = before.depart_s
         leg.go = START if base is None else at_base(base)
+        if waits is not None and waits.arrive_s is not None and base is not None:
+            leg.came = waits
         flown.open, flown.home = leg, None
 
     def _passed_m(self, uav: str, since_s: float, now_s: float) -> list[_MapPoint]:

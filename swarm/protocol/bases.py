@@ -25,6 +25,15 @@ def holds_slot(claim: Claim) -> bool:
     return claim.base is not None and claim.stage is BaseStage.LANDED
 
 
+def wants_slot(claim: Claim) -> bool:
+    """Whether who claims so stands beside the slots of its base with a battery that is used up.
+
+    Who stands there with a full one tells no end of its sortie.
+    """
+    parked = claim.base is not None and claim.stage is BaseStage.PARKED
+    return parked and claim.phase is ClaimPhase.HELD and claim.sortie_end_s is not None
+
+
 def blocking(
     claims: Mapping[str, Claim], lost: Collection[str], ready: Collection[str] = ()
 ) -> dict[str, str]:
@@ -51,10 +60,11 @@ def may_land(
     *,
     waited: bool,
 ) -> bool:
-    """Whether ``uav``, which is above ``base``, may land there now.
+    """Whether ``uav``, which is above ``base`` or beside its slots, may take one of them now.
 
     At once when its claim is held and everybody who claims the base finds a slot; else when it has
-    waited and fewer than there are slots stand there or wait in front of it.
+    waited and fewer than there are slots stand there or wait in front of it. Who waits on the
+    ground lets everybody in the air go first: time costs it nothing.
 
     Args:
         uav: who asks; its own claim is among ``claims``.
@@ -75,11 +85,18 @@ def may_land(
         if other != uav and claim.base == base and claim.stage is not BaseStage.PARKED
     }
     stands = {other for other, where in blocking.items() if where == base and other != uav}
+    place = arrival_order(uav, own)
+    if own.stage is BaseStage.PARKED:
+        ahead = {
+            other
+            for other, claim in claims.items()
+            if claim.base == base and wants_slot(claim) and arrival_order(other, claim) < place
+        }
+        return waited and len(others.keys() | stands | ahead) < slots
     if own.phase is ClaimPhase.HELD and len(others.keys() | stands) < slots:
         return True
     if not waited:
         return False
-    place = arrival_order(uav, own)
     before = {
         other
         for other, claim in others.items()

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
-from agent.core.interface import GoTo, Refused, Return, Swap
+from agent.core.interface import GoTo, Home, Refused, Return, Swap
 from agent.core.states import AgentState
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import CommandKind, MissionPhase
@@ -225,7 +227,8 @@ def test_who_was_lost_on_its_way_blocks_nothing(script: Script) -> None:
     assert agent.state() is AgentState.SWAPPING
 
 
-def test_without_a_slot_it_lands_for_good_when_its_battery_is_used_up(script: Script) -> None:
+def beside_slots(script: Script) -> FieldAgent:
+    """It has waited above the base, whose slot is taken, until its battery was used up."""
     agent = on_its_way(script, "u1")
     agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
     agent.run_until(49.0)
@@ -238,6 +241,78 @@ def test_without_a_slot_it_lands_for_good_when_its_battery_is_used_up(script: Sc
     assert agent.way_home.land
     assert agent.way_home.via_enu_m == ABOVE_BASE
     assert agent.way_home.path_enu_m == ()
+    assert (agent.state(), agent.stage) == (AgentState.BESIDE_SLOTS, BaseStage.PARKED)
+    return agent
+
+
+def test_without_a_slot_it_lands_beside_them_and_swaps_from_there_when_one_is_free(
+    script: Script,
+) -> None:
+    agent = beside_slots(script)
+    agent.happen(Home(), BUDGET_S + 1.0)
+    agent.be_at((50.0, 0.0, 0.0), 0.0)  # an empty battery is none to flee from on the ground
+    agent.run_until(BUDGET_S + 50.0)
+    assert (agent.state(), agent.phase) == (AgentState.BESIDE_SLOTS, ClaimPhase.HELD)
+    assert agent.core.phase is StatusPhase.SERVING
+
+    agent.hear("u1", visiting(BaseStage.PARKED, 5.0), BUDGET_S + 51.0)
+
+    assert (agent.state(), agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+    assert agent.landing.position_enu_m == (50.0, 0.0, 0.0)
+    agent.touch_down(BUDGET_S + 51.0)
+    script.items = ["t0"]
+    agent.get_full(BUDGET_S + 51.0 + SWAP_S)
+    assert agent.state() is AgentState.FLYING
+    assert agent.claim is not None
+    assert agent.claim.sortie_end_s == BUDGET_S + 51.0 + SWAP_S + BUDGET_S
+
+
+def test_who_waits_on_the_ground_lets_those_in_the_air_go_first(script: Script) -> None:
+    agent = beside_slots(script)
+
+    agent.hear("u1", visiting(BaseStage.APPROACHING, 900.0), BUDGET_S + 51.0)
+    agent.run_until(BUDGET_S + 60.0)
+    assert agent.state() is AgentState.BESIDE_SLOTS
+    agent.hear("u1", replace(visiting(BaseStage.PARKED, 900.0), sortie_end_s=910.0), 910.0)
+    assert agent.state() is AgentState.SWAPPING
+
+
+def test_started_again_beside_the_slots_it_still_waits_for_one(script: Script) -> None:
+    agent = beside_slots(script)
+    life = agent.next_life()
+    life.see("u1")
+    life.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    life.run_until(BUDGET_S + 10.0)
+
+    assert (life.state(), life.stage) == (AgentState.BESIDE_SLOTS, BaseStage.PARKED)
+    assert orders(life.log) == []
+    assert life.claim is not None
+    assert life.claim.arrives_s == 50.0
+    life.hear("u1", visiting(BaseStage.PARKED, 5.0), BUDGET_S + 11.0)
+    assert life.state() is AgentState.SWAPPING
+
+
+def test_held_beside_the_slots_it_waits_for_one_again_afterwards(script: Script) -> None:
+    agent = beside_slots(script)
+
+    agent.told(CommandKind.HOLD, BUDGET_S + 5.0)
+    agent.hear("u1", visiting(BaseStage.PARKED, 5.0), BUDGET_S + 6.0)
+    assert agent.state() is AgentState.PAUSED
+    agent.told(CommandKind.RESUME, BUDGET_S + 10.0)
+
+    assert agent.state() is AgentState.BESIDE_SLOTS
+    agent.run_until(BUDGET_S + 12.0)
+    assert agent.state() is AgentState.SWAPPING
+
+
+def test_beside_slots_that_stay_blocked_its_mission_is_over(script: Script) -> None:
+    agent = beside_slots(script)
+
+    agent.lose("u1", BUDGET_S + 5.0)
+
+    agent.run_until(BUDGET_S + 5.0 + agent.timing.stalemate_s - 0.1)
+    assert agent.state() is AgentState.BESIDE_SLOTS
+    agent.run_until(BUDGET_S + 5.0 + agent.timing.stalemate_s + 1.0)
     assert agent.phase is ClaimPhase.OUT
 
 
