@@ -2,7 +2,7 @@
 
 - *fell*: nobody runs out of energy in the air;
 - *in a zone*: nobody flies in a zone at its heights, or nearer to it than the margin; who is in one
-  that is drawn over it leaves, and does not come back;
+  that is drawn over it leaves in time, and does not come back;
 - *out of its window*: no work that is done has begun before it opens, or after it closes, or ends
   after it is due;
 - *no slot*: no more UAVs stand at a base than it has slots;
@@ -15,15 +15,17 @@ decide.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from sim.faults.drawn_zones import DrawnZone
 from sim.world.flight_log import LastSeen
 from sim.world.flown_path import MotionPiece
+from sim.world.motion import Point, flown_s
 from sim.world.virtual_world import World
 from swarm.allocation.field import FieldProblem
 from swarm.model import Mission, Zone
@@ -38,16 +40,8 @@ _SLACK_M = 1e-3
 _MARGIN_SLACK_FRAC = 1e-3
 """Chains of chords in the place of round corners."""
 _SAME_BASE_M = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class DrawnZone:
-    """A zone that counts from some moment on, until another."""
-
-    zone: Zone
-    since_s: float = 0.0
-    """In the world's time [s]; until a reaction later UAVs in it may be on their way out."""
-    until_s: float = math.inf
+_PATIENCE = 3.0
+"""Who leaves a zone may take so many times as long as in calm air: wind, and a slow vehicle."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,15 +76,32 @@ class FieldJudge:
         for drawn in zones:
             forbidden = _forbidden(drawn.zone, margin_m)
             for uav, track in self.world.tracks.items():
-                begun = drawn.since_s > 0.0
-                inside = False
-                for piece in track.pieces(drawn.since_s, drawn.until_s):
-                    enters = _enters(piece, drawn.zone, forbidden)
-                    late = not begun or piece.begin_s > drawn.since_s + self.reaction_s
-                    if enters and late and not (begun and inside):
-                        yield f"{uav} in {drawn.zone.id} from {piece.begin_s:.3f} s on"
+                since_s = drawn.heeded_by_s(uav, self.reaction_s)
+                if since_s == math.inf:
+                    continue
+                chords = _chords_in(track.pieces(since_s, drawn.until_s), drawn.zone, forbidden)
+                leaves_s = self._leaves_s(uav, since_s, forbidden) if drawn.since_s > 0.0 else 0.0
+                outside = leaves_s == 0.0
+                for begin_s, end_s, enters in chords:
+                    outside = outside or not enters
+                    if enters and (outside or end_s > leaves_s):
+                        yield f"{uav} in {drawn.zone.id} at {begin_s:.3f} s"
                         break
-                    inside = enters
+
+    def _leaves_s(self, uav: str, since_s: float, forbidden: shapely.Geometry) -> float:
+        """By when it must have left what has been drawn over it; 0 if it is outside."""
+        import shapely
+
+        place = self.world.tracks[uav].position_enu_m(since_s)
+        if place is None or not shapely.intersects(forbidden, shapely.Point(place[:2])):
+            return 0.0
+        row = next(each for each in self.world.mission.uavs if each.id == uav)
+        out_m = float(shapely.distance(shapely.boundary(forbidden), shapely.Point(place[:2])))
+        return (
+            since_s
+            + self.reaction_s
+            + _PATIENCE * flown_s(out_m, row.speed_m_s, row.acceleration_m_s2)
+        )
 
     # -- times --------------------------------------------------------------------------
 
@@ -136,24 +147,33 @@ def _forbidden(zone: Zone, margin_m: float) -> shapely.Geometry:
     return shapely.difference(shapely.box(-1e7, -1e7, 1e7, 1e7), allowed)
 
 
-def _enters(piece: MotionPiece, zone: Zone, forbidden: shapely.Geometry) -> bool:
+def _chords_in(
+    pieces: Iterable[MotionPiece], zone: Zone, forbidden: shapely.Geometry
+) -> Iterator[tuple[float, float, bool]]:
+    """When each chord of a flight begins and ends [s], and whether it meets what is forbidden."""
     import shapely
 
-    lasts_s = 0.0 if piece.end_s == math.inf else piece.end_s - piece.begin_s
+    for piece in pieces:
+        instants_s, places = _chords(piece)
+        heights_m = [up_m for _, _, up_m in places]
+        if not zone.concerns(min(heights_m), max(heights_m)):
+            yield piece.begin_s, piece.end_s, False
+            continue
+        for (begin_s, end_s), (one, other) in zip(
+            pairwise(instants_s), pairwise(places), strict=True
+        ):
+            flat = one[:2], other[:2]
+            chord = shapely.Point(flat[0]) if flat[0] == flat[1] else shapely.LineString(flat)
+            yield begin_s, end_s, bool(shapely.intersects(forbidden, chord))
+
+
+def _chords(piece: MotionPiece) -> tuple[list[float], list[Point]]:
+    """Instants of a piece [s], one more than chords, and where it is then."""
     if piece.velocity_enu_m_s == piece.acceleration_enu_m_s2 == (0.0, 0.0, 0.0):
-        lasts_s = 0.0
+        return [piece.begin_s, piece.end_s], [piece.place_enu_m] * 2
+    lasts_s = piece.end_s - piece.begin_s
     instants_s = [piece.begin_s + lasts_s * n / _CHORDS for n in range(_CHORDS + 1)]
-    places = [piece.position_enu_m(at_s) for at_s in instants_s]
-    heights_m = [up_m for _, _, up_m in places]
-    if not zone.concerns(min(heights_m), max(heights_m)):
-        return False
-    flat = [place[:2] for place in places]
-    if lasts_s == 0.0:
-        return bool(shapely.intersects(forbidden, shapely.Point(flat[0])))
-    return any(
-        bool(shapely.intersects(forbidden, shapely.LineString([one, other])))
-        for one, other in pairwise(flat)
-    )
+    return instants_s, [piece.position_enu_m(at_s) for at_s in instants_s]
 
 
 class Chances:

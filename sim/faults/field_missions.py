@@ -11,6 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from sim.world.engine import stream
+from swarm.allocation.field import FieldProblem
 from swarm.allocation.legs import Airspace
 from swarm.allocation.legs.planner import PathPlanner
 from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId, Zone, ZoneId
@@ -21,6 +22,8 @@ KINDS_OF_TASK = ("look", "lift")
 _ENOUGH_M = 6.0
 """Places stay that far away from zones, so that who stops beside one is not in it."""
 _TRIES = 200
+_OF_RESERVE = 0.6
+"""That share of a reserve is for batteries that drain faster; slow vehicles and zones take more."""
 
 
 @lru_cache(maxsize=64)
@@ -55,6 +58,22 @@ def random_field_mission(
         wind_enu_m_s=(wind[0], wind[1]),
         zone_margin_m=margin_m,
     )
+
+
+def fair_drain_frac(mission: Mission, uav: str) -> float:
+    """By what share more the battery of ``uav`` may drain at most; twice the rate is 1.
+
+    Who turns home when its charge, the reserve aside, just gets it there has the reserve for what
+    the way takes beyond that, and for the wait for a slot.
+    """
+    problem = FieldProblem.from_mission(mission)
+    row = [str(each.id) for each in mission.uavs].index(uav)
+    me = mission.uavs[row]
+    if me.endurance_s is None:
+        return 1.0
+    homes_s = problem.home_s[row]
+    farthest_s = max(float(homes_s[np.isfinite(homes_s)].max(initial=0.0)), 1e-3)
+    return min(1.0, _OF_RESERVE * me.reserve_frac * me.endurance_s / farthest_s)
 
 
 def _uav(rng: np.random.Generator, planner: PathPlanner, number: int) -> Uav:

@@ -11,7 +11,14 @@ import numpy as np
 from coordinator.planner.field_plan import is_field
 from coordinator.planner.plan import make_plan
 from sim.faults.case import MOST_TASKS, MOST_UAVS, Case, CaseResult, play
-from sim.faults.schedule import Disturbance, DisturbanceKind, parse_schedule, shape_of
+from sim.faults.field_missions import fair_drain_frac
+from sim.faults.schedule import (
+    FIELD_KINDS,
+    Disturbance,
+    DisturbanceKind,
+    parse_schedule,
+    shape_of,
+)
 from sim.world.engine import stream
 from sim.world.network import Topology
 from sim.world.settings import RestartMemory
@@ -71,14 +78,24 @@ def random_schedule(
     *,
     standby: bool = False,
 ) -> tuple[Disturbance, ...]:
-    """What goes wrong in one flight of ``mission``, all of it beginning within ``span_s``."""
-    rng = stream(seed, "schedule")
-    choice = sorted(kinds)
+    """What goes wrong in one flight of ``mission``, all of it beginning within ``span_s``.
+
+    Kinds of the field alone are drawn by themselves, so that the others stay what they were; of
+    a mission that is not in the field there are none.
+    """
+    plain, of_field = sorted(set(kinds) - FIELD_KINDS), sorted(FIELD_KINDS.intersection(kinds))
     coordinators = [COORDINATOR, STANDBY] if standby else [COORDINATOR]
-    drawn = [
-        _draw(rng, choice[int(rng.integers(len(choice)))], mission, coordinators, span_s)
-        for _ in range(int(rng.integers(1, 7)))
-    ]
+
+    def several(name: str, choice: Sequence[DisturbanceKind], most: int) -> list[Disturbance]:
+        rng = stream(seed, name)
+        return [
+            _draw(rng, choice[int(rng.integers(len(choice)))], mission, coordinators, span_s)
+            for _ in range(int(rng.integers(1, 1 + most)))
+        ]
+
+    drawn = several("schedule", plain, 6) if plain else []
+    if of_field and is_field(mission):
+        drawn += several("field schedule", of_field, 3)
     return tuple(sorted(drawn, key=lambda each: each.at_s))
 
 
@@ -97,18 +114,25 @@ def _draw(
     memory = None
     if shape.memory and lasts_s is not None:
         memory = RestartMemory(str(rng.choice([each.value for each in RestartMemory])))
+    at_s = round(float(rng.uniform(0.0, span_s)), 2)
+    names = _names(rng, shape.names, coordinators, uavs, [t.id for t in mission.tasks])
     return Disturbance(
-        at_s=round(float(rng.uniform(0.0, span_s)), 2),
+        at_s=at_s,
         kind=kind,
-        names=_names(rng, shape.names, coordinators, uavs, [t.id for t in mission.tasks]),
+        names=names,
         lasts_s=lasts_s,
-        amount=_amount(rng, kind, is_field(mission)) if shape.amount else None,
+        amount=_amount(rng, kind, mission, names) if shape.amount else None,
         memory=memory,
     )
 
 
-def _amount(rng: np.random.Generator, kind: DisturbanceKind, in_field: bool) -> float:
-    if in_field and kind is DisturbanceKind.SLOW:  # a reserve is not for more
+def _amount(
+    rng: np.random.Generator, kind: DisturbanceKind, mission: Mission, names: Sequence[str]
+) -> float:
+    if kind is DisturbanceKind.DRAIN:
+        most = fair_drain_frac(mission, names[0])
+        return max(0.01, round(most * float(rng.uniform(0.2, 1.0)), 2))
+    if is_field(mission) and kind is DisturbanceKind.SLOW:  # a reserve is not for more
         return round(float(rng.uniform(0.85, 1.0)), 2)
     low, high = {DisturbanceKind.WEATHER: (0.02, 0.5), DisturbanceKind.SKEW: (0.05, 1.0)}.get(
         kind, (0.4, 1.0)

@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable
+from dataclasses import replace
 from functools import partial
 
 from coordinator.operator.requests import OperatorClient
 from coordinator.operator.task_edits import NewTask, TaskWithdrawal
+from coordinator.operator.zone_edits import ZoneRemoval
+from sim.faults.drawn_zones import DrawnZone, zone_over
 from sim.faults.schedule import Disturbance, DisturbanceKind
 from sim.world.engine import Process
 from sim.world.rough_network import RoughNetwork
@@ -35,6 +38,8 @@ class FaultInjector:
         """Processes that hang and never go on."""
         self.left_alone: set[str] = set()
         """UAVs whose agents were not always at work, or were stopped by the operator."""
+        self.drawn: list[DrawnZone] = []
+        """What the operator has drawn in flight, whoever knows of it."""
         self._world = world
         self._network = network
         self._disturbed_s = 0.0
@@ -103,6 +108,26 @@ class FaultInjector:
                 world.command(CommandKind.RETURN, names[0])
             case DisturbanceKind.ABORT:
                 world.command(CommandKind.ABORT)
+            case DisturbanceKind.ZONE:
+                self._draw_zone(what)
+            case DisturbanceKind.DRAIN:
+                world.drain(names[0], 1.0 + (what.amount or 0.0))
+
+    def _draw_zone(self, what: Disturbance) -> None:
+        """Over a UAV; nowhere if it is not in the air, or too near to a start or a base."""
+        number = len(self.drawn)
+        wish = zone_over(self._world, what.names[0], what.amount or 0.0, f"drawn-{number}")
+        if wish is None:
+            return
+        now_s = self._world.queue.now_s()
+        self.drawn.append(DrawnZone(wish.spec(None).zone(), now_s))
+        self._world.operate(wish)
+        self._until(what, partial(self._remove_zone, number))
+
+    def _remove_zone(self, number: int) -> None:
+        drawn = self.drawn[number]
+        self.drawn[number] = replace(drawn, until_s=self._world.queue.now_s())
+        self._world.operate(ZoneRemoval(drawn.zone.id))
 
     def _place(self, along_frac: float) -> Point:
         """As far between the scenario's outermost places [m; mission origin]."""

@@ -39,17 +39,18 @@ from coordinator.core.active import CoordinatorCore
 from coordinator.core.standby import StandbyCore
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.planner.field_plan import is_field
+from sim.faults.drawn_zones import DrawnZone
 from sim.faults.field_judge import Chances, FieldJudge
 from sim.faults.injector import FaultInjector
 from sim.faults.message_log import MessageLog, Violation
 from sim.world.engine import Process
 from sim.world.rough_network import RoughNetwork
 from sim.world.virtual_world import World
-from swarm.model import Task, TaskId
+from swarm.model import Task, TaskId, Zone
 from swarm.protocol.board import TaskState, holders
 from swarm.protocol.events import LogLine
 from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoch
-from swarm.protocol.operator_commands import abort_command, newest_command
+from swarm.protocol.operator_commands import abort_command, newest_command, zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, StatusPhase
 
@@ -91,6 +92,8 @@ class InvariantChecker:
     def attend(self, world: World, network: RoughNetwork, injector: FaultInjector) -> None:
         """Watch this world, which has not begun."""
         self._world, self._network, self._injector = world, network, injector
+        self._zone_known_s: dict[str, dict[str, float]] = {}
+        """By zone drawn in flight: since when each UAV's agent knows of it, or later [s]."""
         world.queue.at(LOOK_EVERY_S, self._look)
 
     # -- while it runs ----------------------------------------------------------------
@@ -159,6 +162,7 @@ class InvariantChecker:
         if self._world.alive:
             self._world.queue.after(LOOK_EVERY_S, self._look)
         agents = [(p, core) for p, core in self._living() if isinstance(core, AgentCore)]
+        self._note_known_zones(agents)
         self._look_for_disobedience(agents)
         self._look_for_shared_tasks(agents)
         self._look_for_equal_registers(agents)
@@ -166,6 +170,14 @@ class InvariantChecker:
             self._look_for_disagreement(agents)
             self._look_for_two_coordinators()
         self._stop_if_broken()
+
+    def _note_known_zones(self, agents: list[tuple[Process, AgentCore]]) -> None:
+        if not self._injector.drawn:
+            return
+        for process, core in agents:
+            for zone in zones_in_force(core.replica):
+                known_s = self._zone_known_s.setdefault(zone.id, {})
+                known_s.setdefault(process.name, self._now_s)
 
     def _look_for_disobedience(self, agents: list[tuple[Process, AgentCore]]) -> None:
         for process, core in agents:
@@ -275,14 +287,30 @@ class InvariantChecker:
 
     def _able_in_field(self, uavs: list[str], task: Task) -> list[str]:
         """Those of ``uavs`` that could have done ``task`` when they were sent home."""
-        world = self._world
+        world, able = self._world, list[str]()
         known = {each.id: each for each in (*world.mission.tasks, task)}
-        mission = replace(world.mission, tasks=tuple(known.values()))
-        seen = {uav: s for uav, s in world.flight_log.last_seen.items() if uav in uavs}
-        return Chances(mission, world.zero_s or 0.0).could_do(seen, [task.id]).get(task.id, [])
+        for uav, seen in world.flight_log.last_seen.items():
+            if uav in uavs:
+                zones = (*world.mission.zones, *self._drawn_over(uav, seen.at_s))
+                mission = replace(world.mission, tasks=tuple(known.values()), zones=zones)
+                chances = Chances(mission, world.zero_s or 0.0)
+                able += chances.could_do({uav: seen}, [task.id]).get(task.id, [])
+        return able
+
+    def _drawn_over(self, uav: str, at_s: float) -> Iterator[Zone]:
+        """Zones drawn in flight that may have kept ``uav`` from what it left undone then."""
+        last = {zone.id for zone in zones_in_force(self._world.agents[uav].replica)}
+        for drawn in self._injector.drawn:
+            if drawn.since_s <= at_s <= drawn.until_s + SETTLED_S or drawn.zone.id in last:
+                yield drawn.zone
 
     def _look_at_the_flights(self) -> None:
-        for invariant, text in FieldJudge(self._world, time_s=_LATE_S).complaints():
+        zones = [DrawnZone(zone) for zone in self._world.mission.zones]
+        for drawn in self._injector.drawn:
+            known_s = self._zone_known_s.get(drawn.zone.id, {})
+            heed = {uav: s for uav, s in known_s.items() if uav not in self._injector.left_alone}
+            zones.append(replace(drawn, known_s=heed))
+        for invariant, text in FieldJudge(self._world, time_s=_LATE_S).complaints(zones):
             uav = text.partition(" ")[0]
             if not (invariant == "fell" and uav in self._injector.left_alone):
                 self._break(invariant, text)

@@ -60,6 +60,16 @@ class DisturbanceKind(StrEnum):
     """The operator sends a UAV home."""
     ABORT = "abort"
     """The operator aborts the mission."""
+    ZONE = "zone"
+    """In the field: the operator draws a zone over a UAV; the amount says how large. With a
+    duration it is taken away after that."""
+    DRAIN = "drain"
+    """In the field: a battery drains faster from now on, by that share of its rate."""
+
+
+FIELD_KINDS: Final = frozenset({DisturbanceKind.ZONE, DisturbanceKind.DRAIN})
+"""What can go wrong only in the field."""
+PLAIN_KINDS: Final = tuple(kind for kind in DisturbanceKind if kind not in FIELD_KINDS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +108,8 @@ _SHAPES: Final = {
     DisturbanceKind.HOLD: DisturbanceShape("uav", lasts=True, must_end=True),
     DisturbanceKind.RETURN: DisturbanceShape("uav"),
     DisturbanceKind.ABORT: DisturbanceShape(""),
+    DisturbanceKind.ZONE: DisturbanceShape("uav", amount=True, lasts=True),
+    DisturbanceKind.DRAIN: DisturbanceShape("uav", amount=True),
 }
 _COUNTS: Final = {"": 0, "process": 1, "uav": 1, "pair": 2, "task": 1, "uav task": 2}
 
