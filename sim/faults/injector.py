@@ -40,6 +40,8 @@ class FaultInjector:
         """UAVs whose agents were not always at work, or were stopped by the operator."""
         self.drawn: list[DrawnZone] = []
         """What the operator has drawn in flight, whoever knows of it."""
+        self.drained: set[str] = set()
+        """UAVs whose batteries drain faster than planned."""
         self._world = world
         self._network = network
         self._disturbed_s = 0.0
@@ -111,6 +113,7 @@ class FaultInjector:
             case DisturbanceKind.ZONE:
                 self._draw_zone(what)
             case DisturbanceKind.DRAIN:
+                self.drained.add(names[0])
                 world.drain(names[0], 1.0 + (what.amount or 0.0))
 
     def _draw_zone(self, what: Disturbance) -> None:

@@ -151,6 +151,11 @@ class InvariantChecker:
             self._break("impossible", f"{process.name}: {note.fields}")
         if note.text == "lost":
             self.message_log.missed(process.name)
+        if note.text == "released":
+            reason, task = str(note.fields["reason"]), str(note.fields["task"])
+            drained = process.name in self._injector.drained and "battery" in reason
+            if drained or (self._injector.drawn and "zone" in reason):
+                self.message_log.gave_up(process.name, task)
         if note.text == "turns aside":
             self.message_log.turned_aside(self._now_s, process.name, str(note.fields["task"]))
             self._stop_if_broken()

@@ -105,6 +105,10 @@ class MessageLog:
         """The vehicle of ``uav`` will not fly to ``task``."""
         self._left.add((uav, task))
 
+    def gave_up(self, uav: str, task: str) -> None:
+        """``uav`` can't do ``task`` any more: its battery drains faster, or a zone was drawn."""
+        self._left.add((uav, task))
+
     def missed(self, uav: str) -> None:
         """``uav`` has given somebody up."""
         self._missed[uav] += 1
