@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from sim.faults.case import Case, format_case, parse_case
+from sim.faults.case import FIRST_IN_FIELD, Case, format_case, parse_case
 from sim.faults.generator import kinds_of, random_case
 from sim.faults.schedule import (
+    PLAIN_KINDS,
     Disturbance,
     DisturbanceKind,
     format_schedule,
@@ -25,7 +26,7 @@ def parsed(text: str) -> tuple[Disturbance, ...]:
     return parse_schedule(text.splitlines(), "faults.txt", PROCESSES, TASKS)
 
 
-@pytest.mark.parametrize("seed", range(50))
+@pytest.mark.parametrize("seed", [*range(50), *range(FIRST_IN_FIELD, FIRST_IN_FIELD + 10)])
 def test_a_case_is_read_as_it_was_written(seed: int) -> None:
     case = random_case(seed, bug="ignore-incarnations" if seed % 2 else "")
 
@@ -65,6 +66,8 @@ def test_a_line_says_what_when_whom_how_badly_how_long_and_with_what_memory() ->
         ("1 crash u0 for 3", "finds a memory"),
         ("1 crash u0 with disk", "finds a memory"),
         ("1 crash u0 for", "is no number"),
+        ("1 zone u0", "takes an amount"),
+        ("1 drain u0 by 0.5 for 3", "cannot last"),
     ],
 )
 def test_a_mistake_is_told_with_its_line(line: str, problem: str) -> None:
@@ -108,8 +111,11 @@ def test_only_the_kinds_asked_for_happen() -> None:
 
 
 def test_every_kind_can_be_drawn_and_written() -> None:
-    schedule = [each for seed in range(60) for each in random_case(seed).schedule]
+    field = range(FIRST_IN_FIELD, FIRST_IN_FIELD + 40)
+    plain = [each for seed in range(60) for each in random_case(seed).schedule]
+    schedule = [*plain, *(each for seed in field for each in random_case(seed).schedule)]
 
+    assert {each.kind for each in plain} == set(PLAIN_KINDS)
     assert {each.kind for each in schedule} == set(DisturbanceKind)
     assert all(shape_of(each.kind).must_end <= (each.lasts_s is not None) for each in schedule)
     assert len(format_schedule(schedule).splitlines()) == len(schedule)

@@ -1,0 +1,252 @@
+"""What judges flights in the field: sound ones pass, and each rule finds what breaks it.
+
+Flights are sound by themselves; what is planted is a stricter mission, or a flight made by hand.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from itertools import pairwise
+
+import pytest
+
+from sim.faults.drawn_zones import DrawnZone
+from sim.faults.field_judge import Chances, FieldJudge
+from sim.world.flight_log import BaseStay, LastSeen
+from sim.world.flown_path import MotionPiece
+from sim.world.simulation import simulate_mission
+from sim.world.track import Track
+from sim.world.uncertainty import Uncertainty
+from sim.world.virtual_world import World
+from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId, Zone, ZoneId
+
+BASE = Base(BaseId("b0"), (0.0, 0.0, 0.0), swap_s=30.0)
+MISSION = Mission(
+    "judged",
+    600.0,
+    tuple(
+        Uav(UavId(f"u{n}"), (10.0 * n, 20.0, 0.0), 10.0, endurance_s=40.0, charge_frac=0.6)
+        for n in range(2)
+    ),
+    (
+        Task(TaskId("t0"), (60.0, 0.0, 0.0), 1.0, service_s=8.0),
+        Task(TaskId("t1"), (0.0, 60.0, 0.0), 1.0, service_s=8.0),
+        Task(TaskId("t2"), (60.0, 60.0, 0.0), 1.0, service_s=8.0),
+        Task(TaskId("t3"), (-60.0, 0.0, 0.0), 1.0, service_s=8.0),
+    ),
+    bases=(BASE,),
+    schema=2,
+)
+SQUARE = ((90.0, -10.0), (110.0, -10.0), (110.0, 10.0), (90.0, 10.0))
+ZONE = Zone(ZoneId("lake"), SQUARE)
+
+
+@cache
+def _flown() -> World:
+    return simulate_mission(MISSION, method="greedy", seed=0, uncertainty=Uncertainty()).world
+
+
+@pytest.fixture
+def world() -> World:
+    """A sound flight, whose mission may be made stricter."""
+    flown = _flown()
+    flown.mission = MISSION
+    flown.fallen_s.clear()
+    return flown
+
+
+def broken(world: World, zones: list[DrawnZone] | None = None) -> list[str]:
+    return [invariant for invariant, _ in FieldJudge(world).complaints(zones)]
+
+
+def stricter(world: World, make: Callable[[Task, float, float], Task]) -> None:
+    """Change the task that was begun last, by when it was begun and ended."""
+    entries = [each for flown in world.executed_schedule().values() for each in flown]
+    last = max((each for each in entries if each.go.startswith("t")), key=lambda each: each.end_s)
+    tasks = (
+        make(task, last.begin_s, last.end_s) if task.id == last.go else task
+        for task in world.mission.tasks
+    )
+    world.mission = replace(world.mission, tasks=tuple(tasks))
+
+
+def test_a_sound_flight_passes(world: World) -> None:
+    assert set(world.mission_state.result().done) == {"t0", "t1", "t2", "t3"}
+    assert len(world.flight_log.stays) >= 2
+    assert broken(world) == []
+
+
+def test_nobody_may_run_out_of_energy(world: World) -> None:
+    world.fallen_s["u1"] = 30.0
+
+    assert broken(world) == ["fell"]
+
+
+@pytest.mark.parametrize("by_s", [0.1, -0.1])
+def test_work_begins_not_before_it_opens(world: World, by_s: float) -> None:
+    stricter(world, lambda task, begin_s, _: replace(task, opens_s=begin_s + by_s))
+
+    assert broken(world) == (["out of its window"] if by_s > 0.0 else [])
+
+
+@pytest.mark.parametrize("by_s", [0.1, -0.1])
+def test_work_begins_not_after_it_closes(world: World, by_s: float) -> None:
+    stricter(world, lambda task, begin_s, _: replace(task, closes_s=begin_s - by_s))
+
+    assert broken(world) == (["out of its window"] if by_s > 0.0 else [])
+
+
+@pytest.mark.parametrize("by_s", [0.1, -0.1])
+def test_work_ends_not_after_it_is_due(world: World, by_s: float) -> None:
+    stricter(world, lambda task, _, end_s: replace(task, due_s=end_s - by_s))
+
+    assert broken(world) == (["out of its window"] if by_s > 0.0 else [])
+
+
+@pytest.mark.parametrize(
+    ("slots", "second_s", "is_sound"),
+    [(None, 20.0, True), (2, 20.0, True), (1, 20.0, False), (1, 50.0, True)],
+)
+def test_no_more_stand_at_a_base_than_it_has_slots(
+    slots: int | None, second_s: float, is_sound: bool
+) -> None:
+    world = on_a_way((0.0, 0.0, 0.0), (1.0, 10.0, 0.0))
+    world.mission = replace(MISSION, bases=(replace(BASE, slots=slots),))
+    world.flight_log.stays += [
+        BaseStay("u0", BASE.id, 10.0, ready_s=40.0, end_s=50.0),
+        BaseStay("u1", BASE.id, second_s, ready_s=80.0),
+    ]
+
+    assert broken(world) == ([] if is_sound else ["no slot"])
+
+
+def test_nobody_flies_through_a_zone_of_the_scenario(world: World) -> None:
+    where_it_works = Zone(ZoneId("z0"), ((55.0, 55.0), (65.0, 55.0), (65.0, 65.0), (55.0, 65.0)))
+    world.mission = replace(MISSION, zones=(where_it_works,))
+    assert broken(world) == ["in a zone"]
+
+    world.mission = replace(MISSION, zones=(replace(where_it_works, floor_m=50.0),))
+    assert broken(world) == []
+
+
+def on_a_way(*corners: tuple[float, float, float]) -> World:
+    """A flight of the first UAV alone, along times [s] and places [m] at 10 m."""
+    world = World(MISSION, lambda *_: pytest.fail("planned"), method="greedy", seed=0)
+    track = Track()
+    (begin_s, east_m, north_m), *_ = corners
+    track.lift_off((east_m, north_m, 10.0), begin_s)
+    pieces = []
+    for one, other in pairwise(corners):
+        lasts_s = other[0] - one[0]
+        speed = ((other[1] - one[1]) / lasts_s, (other[2] - one[2]) / lasts_s, 0.0)
+        pieces.append(MotionPiece(one[0], other[0], (one[1], one[2], 10.0), speed))
+    track.fly(pieces, (corners[-1][1], corners[-1][2], 10.0), begin_s)
+    world.tracks.clear()
+    world.tracks["u0"] = track
+    return world
+
+
+@pytest.mark.parametrize(
+    ("north_m", "margin_m", "is_sound"),
+    [(0.0, 0.0, False), (10.0, 0.0, True), (12.0, 0.0, True), (12.0, 5.0, False)],
+)
+def test_borders_are_outside_and_the_margin_is_inside(
+    north_m: float, margin_m: float, is_sound: bool
+) -> None:
+    world = on_a_way((0.0, 0.0, north_m), (20.0, 200.0, north_m))
+    world.mission = replace(MISSION, zones=(ZONE,), zone_margin_m=margin_m)
+
+    assert broken(world) == ([] if is_sound else ["in a zone"])
+
+
+def test_outside_of_an_inclusive_zone_nobody_flies() -> None:
+    world = on_a_way((0.0, 95.0, 0.0), (1.0, 105.0, 0.0))
+    world.mission = replace(MISSION, zones=(replace(ZONE, inclusive=True),))
+    assert broken(world) == []
+
+    world = on_a_way((0.0, 95.0, 0.0), (2.0, 115.0, 0.0))
+    world.mission = replace(MISSION, zones=(replace(ZONE, inclusive=True),))
+    assert broken(world) == ["in a zone"]
+
+
+DRAWN = DrawnZone(ZONE, since_s=20.0, until_s=200.0)
+
+
+@pytest.mark.parametrize(
+    ("corners", "is_sound"),
+    [
+        pytest.param([(0, 95, 0), (20.1, 95, 0), (24, 85, 0)], True, id="leaves"),
+        pytest.param([(0, 95, 0), (27, 95, 0), (30, 85, 0)], True, id="leaves slowly"),
+        pytest.param([(0, 95, 0), (20.1, 95, 0)], False, id="stays"),
+        pytest.param([(0, 95, 0), (24, 85, 0), (40, 85, 0), (44, 95, 0)], False, id="comes back"),
+        pytest.param([(0, 0, 0), (19, 0, 0), (29, 100, 0), (34, 150, 0)], False, id="flies in"),
+        pytest.param([(0, 50, 0), (19, 50, 0), (24, 120, 0)], True, id="is through at once"),
+        pytest.param([(0, 50, 0), (201, 50, 0), (211, 150, 0)], True, id="is taken away"),
+    ],
+)
+def test_who_is_in_a_zone_when_it_is_drawn_leaves_and_nobody_comes(
+    corners: list[tuple[float, float, float]], is_sound: bool
+) -> None:
+    world = on_a_way(*corners)
+
+    assert broken(world, [DRAWN]) == ([] if is_sound else ["in a zone"])
+    assert broken(world, [replace(DRAWN, known_s={})]) == []  # nobody has heard of it
+
+
+def test_who_hears_of_a_zone_late_has_until_then() -> None:
+    world = on_a_way((0.0, 95.0, 0.0), (60.0, 95.0, 0.0), (64.0, 85.0, 0.0))
+
+    assert broken(world, [replace(DRAWN, known_s={"u0": 60.0})]) == []
+    assert broken(world, [replace(DRAWN, known_s={"u0": 30.0})]) == ["in a zone"]
+
+
+SEEN = LastSeen(5.0, (10.0, 0.0, 10.0), 0.9, True)
+NEAR = Task(TaskId("near"), (50.0, 0.0, 0.0), 1.0)
+CHARGED = replace(MISSION.uavs[0], position_enu_m=(0.0, 0.0, 0.0), charge_frac=1.0)
+
+
+def could(task: Task, seen: LastSeen = SEEN, uav: Uav = CHARGED, *bases: Base) -> list[str]:
+    mission = replace(MISSION, uavs=(uav,), tasks=(task,), bases=bases)
+    return Chances(mission, 0.0).could_do({"u0": seen}, [task.id]).get(task.id, [])
+
+
+def test_a_task_within_reach_is_left_undone_by_who_could_do_it() -> None:
+    assert could(NEAR) == ["u0"]
+
+
+@pytest.mark.parametrize(
+    "task",
+    [
+        pytest.param(replace(NEAR, position_enu_m=(250.0, 0.0, 0.0)), id="beyond its energy"),
+        pytest.param(replace(NEAR, closes_s=6.0), id="has closed"),
+        pytest.param(replace(NEAR, opens_s=500.0), id="opens after its energy has gone"),
+        pytest.param(replace(NEAR, due_s=100.0), id="may be left out"),
+        pytest.param(replace(NEAR, service_s=60.0), id="takes too long"),
+    ],
+)
+def test_a_task_that_cannot_be_done_is_nobodys_fault(task: Task) -> None:
+    assert could(task) == []
+
+
+def test_a_swap_makes_room_for_what_is_too_far_or_opens_late() -> None:
+    spent = replace(SEEN, battery_frac=0.3)
+
+    assert could(NEAR, spent) == []
+    assert could(NEAR, spent, CHARGED, BASE) == ["u0"]
+    assert could(replace(NEAR, opens_s=500.0), SEEN, CHARGED, BASE) == ["u0"]
+
+
+def test_who_cannot_do_it_or_stands_at_its_start_is_not_blamed() -> None:
+    assert could(NEAR, SEEN, replace(CHARGED, success={"near": 0.0})) == []
+    landed = replace(SEEN, flies=False, place_enu_m=(0.0, 0.0, 0.0))
+    assert could(NEAR, landed) == []
+    assert could(NEAR, landed, CHARGED, BASE) == ["u0"]
+
+
+def test_an_endless_battery_could_do_what_opens_late() -> None:
+    endless = replace(CHARGED, endurance_s=None)
+    seen = replace(SEEN, battery_frac=None)
+
+    assert could(replace(NEAR, opens_s=500.0), seen, endless) == ["u0"]
