@@ -56,11 +56,13 @@ def soak(
 
     They are random themselves, and played in virtual time. Every case follows from its seed. One
     that fails is made as small as possible, printed, and written to a file that --replay plays
-    again. Exit status 0: every invariant held.
+    again. Seeds from 1000000 on have accelerations, those from 2000000 on all of the field's
+    constraints: batteries, bases, zones, wind, windows. Exit status 0: every invariant held.
 
     Examples:
         swarm soak --seeds 10000
         swarm soak --seeds 500 --faults cut,crash --first 20000
+        swarm soak --seeds 500 --first 2000000
         swarm soak --replay failing.case
     """
     import sys
