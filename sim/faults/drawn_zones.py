@@ -47,7 +47,8 @@ def zone_over(world: World, uav: str, size_frac: float, name: str) -> NewZone | 
     if place is None:
         return None
     mission = world.mission
-    landings = [each.position_enu_m for each in (*mission.uavs, *mission.bases)]
+    landings = [uav.position_enu_m for uav in mission.uavs]
+    landings += [base.position_enu_m for base in mission.bases]
     room_m = min(math.dist(place[:2], there[:2]) for there in landings)
     reach_m = _LEAST_M + size_frac * (_MOST_M - _LEAST_M)
     reach_m = min(reach_m, room_m - mission.zone_margin_m - _CLEAR_M)

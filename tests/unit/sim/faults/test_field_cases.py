@@ -37,7 +37,8 @@ def test_a_smaller_mission_is_a_part_of_the_larger_one() -> None:
 def test_every_place_is_outside_of_all_zones() -> None:
     for seed in SEEDS:
         mission = largest(seed).flown()
-        places = [row.position_enu_m for row in (*mission.uavs, *mission.bases)]
+        places = [uav.position_enu_m for uav in mission.uavs]
+        places += [base.position_enu_m for base in mission.bases]
         places += [
             point for task in mission.tasks for point in task.path_enu_m or (task.position_enu_m,)
         ]
@@ -106,9 +107,8 @@ def test_a_zone_is_drawn_over_a_uav_in_the_air_but_over_no_start_or_base(
             zone = wish.spec(None).zone()
             margin_m = world.mission.zone_margin_m
             planner = Airspace((zone,), margin_m).concerning(-1e6, 1e6)
-            landings = [
-                row.position_enu_m[:2] for row in (*world.mission.uavs, *world.mission.bases)
-            ]
+            landings = [uav.position_enu_m[:2] for uav in world.mission.uavs]
+            landings += [base.position_enu_m[:2] for base in world.mission.bases]
             assert planner.free(np.array(landings)).all()
             assert not planner.free(np.array([place[:2]]))[0]
     assert drawn > 0
