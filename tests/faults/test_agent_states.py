@@ -10,9 +10,9 @@ from agent.core.states import TRANSITIONS, AgentState, AgentStateMachine, Trigge
 from sim.faults.case import play
 from sim.faults.generator import random_case
 
-SEEDS = (0, 8, 130, 203, 2_000_000, 2_000_031)
+SEEDS = (0, 8, 130, 203, 2_000_031, 2_000_084)
 """In these operators hold UAVs, once until the mission is over, and a lost claim is recovered; in
-the last two UAVs visit bases, wait there for slots and for tasks to open."""
+the last two UAVs visit bases, and wait above and beside them for slots and for tasks to open."""
 NOT_IN_A_SOAK = {AgentState.RETURNING, AgentState.OUT, AgentState.LEFT, AgentState.YIELDED}
 """Only a vehicle with a will of its own or a second agent brings these about; see the storms of
 tests/unit/agent/core and the bridged fleets here."""
