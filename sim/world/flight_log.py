@@ -229,6 +229,8 @@ class FlightLog:
         task = self._tasks.get(order.task or "")
         leg.leg = order.leg
         if leg.arrive_s is not None and task is not None and task.path_enu_m:
+            if way == leg.via_m[-1:]:
+                return  # another life of its agent sends it where it is already, and waits on
             leg.begin_s = now_s if leg.begin_s is None else leg.begin_s
             leg.is_reversed = way[-1] == task.path_enu_m[0][:2]
             return

@@ -169,7 +169,7 @@ def shown_lost_within(page: Page, uav: str, agent: subprocess.Popen[str], limit_
     agent.wait()
     while "lost" not in (does.text_content() or ""):
         looked_s = time.monotonic()
-        assert looked_s - began_s < SOON_MS / 1e3
+        assert looked_s - began_s < SOON_MS / 1e3, does.text_content()
         page.wait_for_timeout(LOOK_S * 1e3)
         late_s += time.monotonic() - looked_s - LOOK_S
     assert time.monotonic() - began_s - late_s < limit_s

@@ -1,0 +1,40 @@
+"""What vehicles did, as a schedule, where an agent starts anew in the middle of it."""
+
+from __future__ import annotations
+
+from agent.core.interface import Arrived, GoTo, Telemetry
+from sim.world.flight_log import FlightLog
+from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+
+LINE = ((100.0, 0.0, 0.0), (100.0, 50.0, 0.0), (100.0, 200.0, 0.0))
+MISSION = Mission(
+    "logged",
+    600.0,
+    (Uav(UavId("u0"), (0.0, 0.0, 0.0), 10.0),),
+    (Task(TaskId("line"), LINE[0], 1.0, opens_s=30.0, path_enu_m=LINE),),
+    origin=Origin(46.8, 9.7, 1100.0),
+)
+
+
+def at(place_enu_m: tuple[float, float, float]) -> Telemetry:
+    """The vehicle stands there in the air."""
+    return Telemetry(place_enu_m, (0.0, 0.0, 0.0), None)
+
+
+def test_a_line_begins_when_it_is_flown_not_when_its_first_end_is_ordered_again() -> None:
+    log = FlightLog(MISSION, {})
+
+    log.ordered("u0", GoTo(1, LINE[0], task="line"), at((0.0, 0.0, 0.0)), 0.0)
+    log.reported("u0", Arrived(1), 10.0)
+    # Another life of its agent resumes the claim before the task opens.
+    log.ordered("u0", GoTo(1, LINE[0], task="line"), at(LINE[0]), 12.0)
+    log.reported("u0", Arrived(1), 12.0)
+    along = GoTo(2, LINE[2], task="line", via_enu_m=(LINE[1],))
+    log.ordered("u0", along, at(LINE[0]), 30.0)
+    log.reported("u0", Arrived(2), 50.0)
+    log.attempt_ended("u0", "line", 1, 50.0, 0.0)
+
+    (entry,) = log.executed_schedule(0.0)[UavId("u0")]
+    times_s = entry.depart_s, entry.arrive_s, entry.begin_s, entry.end_s
+    assert times_s == (0.0, 10.0, 30.0, 50.0)
+    assert not entry.is_reversed
