@@ -9,7 +9,7 @@ from collections.abc import Iterator
 import pytest
 from hypothesis import settings
 
-settings.register_profile("day", settings(deadline=None, max_examples=40))
+settings.register_profile("day", settings(deadline=None))
 settings.register_profile("night", settings(deadline=None, max_examples=200))
 settings.load_profile("night")
 
