@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from swarm.model import Zone
 from swarm.protocol.events import CommonAction, CommonEvent
 
 
@@ -58,13 +59,42 @@ class Swap:
     """Land on the spot, and get the battery changed.
 
     The vehicle says `Landed`, then `Swapped` once its battery is full. Where a person has to
-    let it start again, it says so only after that.
+    let it start again, it says so only after `Ready`.
     """
 
     leg: int
     """Number of this order; `Landed` and `Swapped` repeat it."""
     position_enu_m: tuple[float, float, float]
     """The place on the ground [m; mission origin, height included]."""
+    swap_s: float = field(default=0.0, repr=False)
+    """How long a battery takes to be changed there [s], for vehicles that start by themselves."""
+    speed_m_s: float | None = field(default=None, repr=False)
+    """Cruise ground speed from there on [m/s]; None: as before."""
+
+
+@dataclass(frozen=True, slots=True)
+class Ready:
+    """A person has seen to the vehicle of that `Swap`, and lets it start again.
+
+    It moves nothing: `Swapped` follows once the battery is full, too.
+    """
+
+    leg: int
+    """Number of the `Swap`; of any other it means nothing."""
+
+
+@dataclass(frozen=True, slots=True)
+class KeepOut:
+    """Where not to fly from now on, in place of what was said before.
+
+    It moves nothing, and goes before the orders that heed it. Which way leads round is the
+    agent's to say; a vehicle that is told to fly straight through refuses.
+    """
+
+    zones: tuple[Zone, ...]
+    """In force, whatever their heights."""
+    margin_m: float = 0.0
+    """Distance to keep from them [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +127,10 @@ class Return:
     """Land at `via_enu_m` rather than return to launch from there."""
 
 
-VehicleOrder = Prepare | GoTo | Swap | Hold | Return
+VehicleWord = Ready | KeepOut
+"""What a vehicle is told that moves nothing."""
+
+VehicleOrder = Prepare | GoTo | Swap | Hold | Return | VehicleWord
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,7 +20,9 @@ from functools import partial
 from agent.core.interface import (
     GoTo,
     Hold,
+    KeepOut,
     Prepare,
+    Ready,
     Return,
     ReturnAdvised,
     Swap,
@@ -102,7 +104,7 @@ class Bridge:
             case BytesReceived(data, source):
                 for heard in session.codec.decode(data, source, now_s):
                     self._hear(heard)
-            case Prepare() | GoTo() | Swap() | Hold() | Return():
+            case Prepare() | GoTo() | Swap() | Hold() | Return() | Ready() | KeepOut():
                 self._activity = obey(self._activity, event, session)
             case LinkOpened():
                 session.contact.link_up = True

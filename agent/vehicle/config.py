@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import ClassVar
 
 from agent.vehicle.commands import CommandPolicy
+from swarm.model import Zone
 from swarm.model.frames import Origin
 from swarm.protocol.fields import Point
 from swarm.runtime.errors import Fault, InputError
@@ -111,6 +112,20 @@ class BridgeConfig:
     """Targets farther from the origin are refused [m, horizontally]."""
     fence_height_m: float = 1_000.0
     """Targets higher above the origin, or lower below it, are refused [m]."""
+    zones: tuple[Zone, ...] = ()
+    """Where not to fly, as long as no `KeepOut` says anything else."""
+    zone_margin_m: float = 0.0
+    """Distance to keep from them [m]."""
+    ready_by_itself: bool = False
+    """Whether a vehicle that has landed for another battery starts again without anybody's word:
+    for simulated ones, beside which nobody stands."""
+    full_battery_frac: float = 0.9
+    """Charge from which on a battery counts as changed, 0..1."""
+    corner_m: float = 2.0
+    """How far corners of a path may be cut [m]."""
+    disarm_after_s: float = 10.0
+    """A vehicle that has landed for another battery disarms by itself within that time, or is
+    told to."""
 
     def __post_init__(self) -> None:
         for name in ("system_id", "ground_system_id", "ground_component_id"):
@@ -119,11 +134,16 @@ class BridgeConfig:
                 raise ValueError(f"{name} must be a whole number within 1..255, not {value}")
         for each in fields(self):
             value = getattr(self, each.name)
-            if each.type in ("int", "float") and not (math.isfinite(value) and value > 0):
+            may_be_zero = each.name == "zone_margin_m"
+            if each.type not in ("int", "float") or (may_be_zero and value == 0):
+                continue
+            if not (math.isfinite(value) and value > 0):
                 raise ValueError(f"{each.name} must be a number > 0, not {value}")
         reserve_frac = self.battery_reserve_frac
         if reserve_frac is not None and not 0.0 < reserve_frac < 1.0:
             raise ValueError(f"battery_reserve_frac must be within 0..1, not {reserve_frac}")
+        if self.full_battery_frac > 1.0:
+            raise ValueError(f"full_battery_frac must be at most 1, not {self.full_battery_frac}")
 
     def out_of_bounds(self, position_enu_m: Point) -> str | None:
         """Why a target must not be sent to the vehicle, in words; None if it may be."""

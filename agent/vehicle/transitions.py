@@ -16,7 +16,9 @@ from agent.core.interface import (
     Held,
     Hold,
     Home,
+    KeepOut,
     Prepare,
+    Ready,
     Refused,
     Return,
     ReturnAdvised,
@@ -120,6 +122,8 @@ def obey(activity: Activity, order: VehicleOrder, session: VehicleSession) -> Ac
             return _return_home(activity, order, session)
         case Swap():
             session.report(Refused(order, _NO_SWAP))
+            return activity
+        case Ready() | KeepOut():
             return activity
 
 

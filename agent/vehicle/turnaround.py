@@ -20,7 +20,7 @@ from typing import Final
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from agent.core.interface import Arrived, GoTo, VehicleOrder, VehicleReport
+from agent.core.interface import Arrived, GoTo, VehicleOrder, VehicleReport, VehicleWord
 
 _COMMAND_INT: Final[int] = mavlink.MAVLINK_MSG_ID_COMMAND_INT
 _MISSION_ACK: Final[int] = mavlink.MAVLINK_MSG_ID_MISSION_ACK
@@ -75,6 +75,8 @@ class TurnaroundMeter:
 
     def ordered(self, order: VehicleOrder) -> None:
         """The bridge is given an order."""
+        if isinstance(order, VehicleWord):
+            return
         self._uploading = None
         if isinstance(order, GoTo) and order.idled and self._free_s is not None:
             self.idled += 1

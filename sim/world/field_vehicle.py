@@ -26,6 +26,7 @@ from agent.core.interface import (
     Telemetry,
     VehicleOrder,
     VehicleReport,
+    VehicleWord,
 )
 from sim.world.battery import FlightBattery
 from sim.world.engine import EventQueue
@@ -104,6 +105,8 @@ class FieldVehicle:
     def order(self, order: VehicleOrder, ready: VehicleReport) -> None:
         """Obey ``order``; ``ready`` is what it says once it is prepared."""
         now_s = self._queue.now_s()
+        if isinstance(order, VehicleWord):  # it is ready by itself, and knows the zones
+            return
         if isinstance(order, GoTo) and self._swap_ends_s > now_s:
             self._refuse(order, "its battery is being changed")
             return

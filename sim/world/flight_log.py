@@ -22,6 +22,7 @@ from agent.core.interface import (
     Telemetry,
     VehicleOrder,
     VehicleReport,
+    VehicleWord,
 )
 from sim.world.motion import Point
 from sim.world.track import Track
@@ -124,7 +125,7 @@ class FlightLog:
     ) -> None:
         """The vehicle that is there is told to do something; None: it is not known where."""
         flown = self._flown[uav]
-        if telemetry is None:
+        if telemetry is None or isinstance(order, VehicleWord):
             return
         place_enu_m = telemetry.position_enu_m
         track = self._tracks.get(uav)

@@ -25,6 +25,7 @@ from agent.core.interface import (
     Telemetry,
     VehicleOrder,
     VehicleReport,
+    VehicleWord,
 )
 from sim.world.engine import EventQueue
 from sim.world.flown_path import FlownPath, MotionPiece
@@ -78,6 +79,8 @@ class IdealVehicle:
 
     def order(self, order: VehicleOrder, ready: VehicleReport) -> None:
         """Obey ``order``; ``ready`` is what it says once it is prepared."""
+        if isinstance(order, VehicleWord):
+            return
         self._orders += 1
         match order:
             case Prepare():
@@ -184,6 +187,8 @@ class StochasticVehicle(IdealVehicle):
 
     def order(self, order: VehicleOrder, ready: VehicleReport) -> None:
         """Obey ``order``; ``ready`` is what it says once it is prepared."""
+        if isinstance(order, VehicleWord):
+            return
         self._astray_m = self._becomes_m = self._astray_now_m()
         super().order(order, ready)
 
