@@ -87,7 +87,7 @@ def autopilot(
         typer.Option(
             "--wind-m-s",
             metavar="EAST,NORTH",
-            help="Steady wind, by where it blows to [m/s]; default: none.",
+            help="Steady wind, by where it blows to [m/s]; default: the scenario's.",
         ),
     ] = None,
     gust_m_s: Annotated[
@@ -101,9 +101,17 @@ def autopilot(
             "--endurance-s",
             min=1.0,
             metavar="S",
-            help="Armed time that empties a battery [s]; default: it stays full.",
+            help="Armed time that empties a battery [s]; default: the airborne time that the "
+            "scenario says, else it stays full.",
         ),
     ] = None,
+    swap_reboot: Annotated[
+        bool,
+        typer.Option(
+            "--swap-reboot/--no-swap-reboot",
+            help="Whether an autopilot loses its power while its battery is changed at a base.",
+        ),
+    ] = True,
     battery_failsafe: Annotated[
         bool,
         typer.Option(
@@ -156,10 +164,9 @@ def autopilot(
     from swarm.model import UavId
     from swarm.runtime.errors import Fault, InputError
     from swarm.runtime.process import run_until_stopped
-    from swarm.scenario import load_scenario, require_plain
+    from swarm.scenario import load_scenario
 
     mission = load_scenario(scenario)
-    require_plain(mission, "swarm autopilot")
     configure_logging(log_level, log_format, mission=mission.name)
     known = [member.id for member in mission.uavs]
     unknown = [name for name in uav or () if name not in known]
@@ -180,14 +187,17 @@ def autopilot(
     )
     physics = Physics(
         acceleration_m_s2=acceleration_m_s2,
-        wind_enu_m_s=parse_wind(wind_m_s),
+        wind_enu_m_s=None if wind_m_s is None else parse_wind(wind_m_s),
         gust_m_s=gust_m_s,
         seed=seed,
         endurance_s=endurance_s,
         battery_failsafe=BatteryFailsafe() if battery_failsafe else None,
         position_failsafe_s=position_failsafe_s,
+        swap_reboots=swap_reboot,
     )
-    check_wind(math.hypot(*physics.wind_enu_m_s), fleet_of(mission, wanted, system_id))
+    if physics.wind_enu_m_s is not None:
+        still = fleet_of(mission, wanted, system_id, Physics(wind_enu_m_s=(0.0, 0.0)))
+        check_wind(math.hypot(*physics.wind_enu_m_s), still)
     faults = faults_by_uav(fault or (), known)
     fleet = fleet_of(mission, wanted, system_id, physics)
     keys: dict[str, SigningKey] = {}

@@ -65,6 +65,24 @@ class BatteryFailsafe:
 
 
 @dataclass(frozen=True, slots=True)
+class ServedBase:
+    """A place where somebody gives a vehicle that landed there another battery.
+
+    Raises:
+        ValueError: the duration is out of range.
+    """
+
+    position_enu_m: Point
+    """On the ground [m]."""
+    swap_s: float = 0.0
+    """From touch-down until the vehicle may be armed again [s]."""
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.swap_s < math.inf:
+            raise ValueError(f"swap_s must be >= 0, not {self.swap_s}")
+
+
+@dataclass(frozen=True, slots=True)
 class VehicleConfig:
     """One simulated vehicle.
 
@@ -91,12 +109,25 @@ class VehicleConfig:
     """Rest on the ground that makes a landing [s]."""
     endurance_s: float | None = None
     """Armed time that empties a full battery [s]; None: it stays full."""
+    charge_frac: float = 1.0
+    """Charge of the battery at power-up, 0..1."""
+    drains_in_flight: bool = False
+    """Only the time off the ground counts, as in plans, rather than all of the armed time."""
+    bases: tuple[ServedBase, ...] = ()
+    """Where the battery is changed."""
+    swap_reboots: bool = True
+    """The change cuts the autopilot's power; it is silent, and boots again."""
+    swap_silence_s: float = 5.0
+    """For how long it is without power then [s]."""
     battery_failsafe: BatteryFailsafe | None = None
     """None: the firmware lets the battery run empty, and the vehicle flies on."""
     position_failsafe_s: float | None = None
     """Time without GPS after which the firmware lands the vehicle [s]; None: it hovers."""
     acceleration_m_s2: float | None = None
     """Greatest acceleration [m/s²]; None: speeds change in no time."""
+    airspeed_limit_m_s: float | None = None
+    """Greatest speed through the air [m/s]; None: half as much again as the cruise speed, and more
+    where more is ordered."""
     wind: Wind | None = None
     """The air it flies in; None: still."""
 
@@ -110,11 +141,14 @@ class VehicleConfig:
             "endurance_s",
             "position_failsafe_s",
             "acceleration_m_s2",
+            "airspeed_limit_m_s",
         ):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:
                 raise ValueError(f"{name} must be positive and finite, not {value}")
-        for name in ("spool_up_s", "touchdown_s"):
+        if not 0.0 <= self.charge_frac <= 1.0:
+            raise ValueError(f"charge_frac must be within 0..1, not {self.charge_frac}")
+        for name in ("spool_up_s", "touchdown_s", "swap_silence_s"):
             if not 0.0 <= getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must be >= 0, not {getattr(self, name)}")
         if self.wind is not None and self.wind.speed_m_s >= self.airspeed_m_s:
@@ -125,8 +159,9 @@ class VehicleConfig:
 
     @property
     def airspeed_m_s(self) -> float:
-        """Greatest speed through the air [m/s]: half as much again as the cruise speed."""
-        return _AIRSPEED_PER_CRUISE * self.cruise_m_s
+        """Greatest speed through the air [m/s]."""
+        limit_m_s = self.airspeed_limit_m_s
+        return _AIRSPEED_PER_CRUISE * self.cruise_m_s if limit_m_s is None else limit_m_s
 
     def motion(self) -> Motion:
         """How it moves from its start on."""
@@ -134,7 +169,9 @@ class VehicleConfig:
         if self.acceleration_m_s2 is not None:
             motion = SmoothMotion(self.start_enu_m, self.acceleration_m_s2)
         if self.wind is not None:
-            motion = WindyMotion(motion, self.wind, self.airspeed_m_s, self.start_enu_m[2])
+            exact = self.airspeed_limit_m_s is not None
+            ground_up_m = self.start_enu_m[2]
+            motion = WindyMotion(motion, self.wind, self.airspeed_m_s, ground_up_m, exact=exact)
         return motion
 
 
@@ -155,21 +192,29 @@ class Physics:
 
     acceleration_m_s2: float | None = None
     """Of all; None: of each what the scenario says."""
-    wind_enu_m_s: tuple[float, float] = (0.0, 0.0)
-    """East and north, where the wind blows to [m/s]."""
+    wind_enu_m_s: tuple[float, float] | None = None
+    """East and north, where the wind blows to [m/s]; None: what the scenario says, which only
+    vehicles feel whose airspeed it gives."""
     gust_m_s: float = 0.0
     seed: int = 0
     """Of the gusts; each UAV of a scenario has its own, wherever it is simulated."""
     endurance_s: float | None = None
+    """Armed time of all; None: of each the airborne time that the scenario says."""
     battery_failsafe: BatteryFailsafe | None = None
     position_failsafe_s: float | None = None
+    swap_reboots: bool = True
+    """Whether the change of a battery cuts the autopilot's power."""
 
-    def wind(self, place: int) -> Wind | None:
+    def wind(self, mission: Mission, place: int) -> Wind | None:
         """The air around the UAV at that place of the scenario; None if it is still."""
         gusts = None
         if self.gust_m_s > 0.0:
             gusts = gusts_of(self.gust_m_s, np.random.default_rng([self.seed, place]))
-        air = Wind(self.wind_enu_m_s, gusts)
+        velocity_enu_m_s = self.wind_enu_m_s
+        if velocity_enu_m_s is None:
+            felt = mission.uavs[place].airspeed_m_s is not None
+            velocity_enu_m_s = mission.wind_enu_m_s if felt else (0.0, 0.0)
+        air = Wind(velocity_enu_m_s, gusts)
         return air if gusts is not None or air.speed_m_s > 0.0 else None
 
 
@@ -193,7 +238,8 @@ def fleet_of(
         ValueError: the mission has no UAV of that id, or the physics are out of range.
     """
     physics = physics or Physics()
-    given_m_s2 = physics.acceleration_m_s2
+    given_m_s2, given_s = physics.acceleration_m_s2, physics.endurance_s
+    bases = tuple(ServedBase(base.position_enu_m, base.swap_s) for base in mission.bases)
     places = {uav.id: place for place, uav in enumerate(mission.uavs)}
     members = []
     for number, wanted in enumerate(places if uavs is None else uavs):
@@ -207,11 +253,16 @@ def fleet_of(
             start_enu_m=uav.position_enu_m,
             origin=mission.origin or DEFAULT_ORIGIN,
             cruise_m_s=uav.speed_m_s,
-            endurance_s=physics.endurance_s,
+            endurance_s=uav.endurance_s if given_s is None else given_s,
+            charge_frac=uav.charge_frac if given_s is None else 1.0,
+            drains_in_flight=given_s is None and uav.endurance_s is not None,
+            bases=bases,
+            swap_reboots=physics.swap_reboots,
             battery_failsafe=physics.battery_failsafe,
             position_failsafe_s=physics.position_failsafe_s,
             acceleration_m_s2=uav.acceleration_m_s2 if given_m_s2 is None else given_m_s2,
-            wind=physics.wind(place),
+            airspeed_limit_m_s=uav.airspeed_m_s,
+            wind=physics.wind(mission, place),
         )
         members.append(FleetMember(uav.id, config))
     return tuple(members)

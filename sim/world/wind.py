@@ -86,14 +86,22 @@ class Wind:
 class WindyMotion:
     """The motion ``still``, of still air, in wind.
 
-    The greatest airspeed is exceeded where a greater speed is ordered. The ground is at
-    ``ground_up_m``.
+    The greatest airspeed is exceeded where a greater speed is ordered, unless it is ``exact``. The
+    ground is at ``ground_up_m``.
 
     Raises:
         ValueError: the vehicle could not fly against the wind.
     """
 
-    def __init__(self, still: Motion, wind: Wind, airspeed_m_s: float, ground_up_m: float) -> None:
+    def __init__(
+        self,
+        still: Motion,
+        wind: Wind,
+        airspeed_m_s: float,
+        ground_up_m: float,
+        *,
+        exact: bool = False,
+    ) -> None:
         if not wind.speed_m_s < airspeed_m_s < math.inf:
             raise ValueError(
                 f"airspeed must exceed the wind's {wind.speed_m_s} m/s, not be {airspeed_m_s} m/s"
@@ -102,6 +110,7 @@ class WindyMotion:
         self._wind = wind
         self._airspeed_m_s = airspeed_m_s
         self._ground_up_m = ground_up_m
+        self._exact = exact
 
     @property
     def target_enu_m(self) -> Point:
@@ -151,9 +160,10 @@ class WindyMotion:
             east, north, up = (
                 (to - at) / length_m for to, at in zip(target_enu_m, here, strict=True)
             )
-            speed_m_s = self._wind.ground_speed_m_s(
-                (east, north, up), speed_m_s, max(self._airspeed_m_s, speed_m_s)
-            )
+            airspeed_m_s = self._airspeed_m_s
+            if not self._exact:
+                airspeed_m_s = max(airspeed_m_s, speed_m_s)
+            speed_m_s = self._wind.ground_speed_m_s((east, north, up), speed_m_s, airspeed_m_s)
         self._still.fly_to(target_enu_m, speed_m_s, now_s)
 
     def stop(self, now_s: float) -> None:
