@@ -25,10 +25,10 @@ from swarm.runtime.options import (
 if TYPE_CHECKING:
     from agent.core.agent_core import AgentCore
     from agent.core.interface import VehicleReport
-    from agent.runner import Vehicle
+    from agent.runner import MakeVehicle, Vehicle
     from swarm.bus.config import BusConfig
     from swarm.identity import Identity
-    from swarm.model import Origin
+    from swarm.protocol.messages import MissionConfig
     from swarm.runtime.clock import ScaledClock
     from swarm.runtime.store import Memory, Store
 
@@ -122,16 +122,18 @@ def agent(
         ),
     ] = False,
     battery_reserve: Annotated[
-        float,
+        float | None,
         typer.Option(
             "--battery-reserve",
             min=0.0,
             max=0.99,
             metavar="FRAC",
             help="Below this charge (0.2 is 20 %) the UAV goes home, and is not armed; 0 leaves "
-            "the battery to the autopilot.",
+            "the battery to the autopilot. Default: 0.2; of a UAV whose endurance the mission "
+            "tells, half of its reserve, which the agent keeps by itself.",
+            show_default=False,
         ),
-    ] = 0.2,
+    ] = None,
     keep_jerk: Annotated[
         bool,
         typer.Option(
@@ -206,6 +208,7 @@ def agent(
     from agent.vehicle.config import BridgeConfig
     from agent.vehicle.signing import load_signing_key
     from swarm.identity import Role
+    from swarm.model import Origin
     from swarm.runtime.clock import ScaledClock, incarnation
     from swarm.runtime.log import configure_logging
     from swarm.runtime.store import Store
@@ -224,17 +227,17 @@ def agent(
     if config.identity is not None and key is None:
         _tell_unsigned(uav, config.identity)
 
-    def vehicle(origin: Origin, report: Callable[[VehicleReport], None]) -> Vehicle:
+    def vehicle(brief: MissionConfig, report: Callable[[VehicleReport], None]) -> Vehicle:
         settings = BridgeConfig(
             system_id=system_id,
-            origin=origin,
+            origin=Origin(*brief.origin),
             ground_system_id=own_system_id,
             ground_component_id=own_component_id,
             command=command,
             accept_no_failsafe=accept_no_failsafe,
             acceptance_radius_m=acceptance_radius_m,
             position_rate_hz=position_rate_hz,
-            battery_reserve_frac=battery_reserve or None,
+            battery_reserve_frac=_reserve_frac(battery_reserve, brief, uav),
             raises_jerk=not keep_jerk,
             fence_radius_m=fence_radius_m,
             fence_height_m=fence_height_m,
@@ -271,7 +274,7 @@ def agent(
 def _live(
     config: BusConfig,
     make_core: Callable[[Memory | None], AgentCore],
-    make_vehicle: Callable[[Origin, Callable[[VehicleReport], None]], Vehicle],
+    make_vehicle: MakeVehicle,
     clock: ScaledClock,
     *,
     mission: str,
@@ -327,6 +330,21 @@ def _tell_no_bus(uav: str, reason: str) -> None:
 
     get_logger(uav).warning("no bus yet", reason=reason)
     SERVICE_NOTIFIER.waiting(f"{uav}: no bus yet: {reason}")
+
+
+_RESERVE_FRAC = 0.2
+_LAST_FRAC = 0.5
+"""Of the reserve that an agent plans with: below that its plan has failed."""
+
+
+def _reserve_frac(asked: float | None, brief: MissionConfig, uav: str) -> float | None:
+    """Charge below which the bridge has the UAV go home; None leaves that to the autopilot."""
+    if asked is not None:
+        return asked or None
+    for spec in brief.uavs:
+        if spec.id == uav and spec.endurance_s is not None:
+            return _LAST_FRAC * spec.reserve_frac or None
+    return _RESERVE_FRAC
 
 
 def _ground_ids(text: str) -> tuple[int, int]:

@@ -27,9 +27,8 @@ from agent.core.interface import (
     VehicleReport,
 )
 from swarm.bus.port import Bus
-from swarm.model import Origin
 from swarm.protocol.events import Stop
-from swarm.protocol.messages import Snapshot
+from swarm.protocol.messages import MissionConfig, Snapshot
 from swarm.protocol.timing import PRESETS, LinkKind
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import BusError
@@ -65,6 +64,10 @@ class Vehicle(Protocol):
     async def close(self) -> None:
         """Close the link; the vehicle goes on with what it does."""
         ...
+
+
+MakeVehicle = Callable[[MissionConfig, Callable[[VehicleReport], None]], Vehicle]
+"""Makes the vehicle for a mission, with a callback for its reports."""
 
 
 class _Dropping(Protocol):
@@ -139,7 +142,7 @@ async def _seat(open_bus: Callable[[], Awaitable[Bus]], on_wait: Callable[[str],
 async def live_once(
     open_bus: Callable[[], Awaitable[Bus]],
     make_core: Callable[[Memory | None], AgentCore],
-    make_vehicle: Callable[[Origin, Callable[[VehicleReport], None]], Vehicle],
+    make_vehicle: MakeVehicle,
     clock: Clock,
     *,
     mission: str,
@@ -190,7 +193,7 @@ async def run_agent(
     mission: str,
     bus: Bus,
     clock: Clock,
-    make_vehicle: Callable[[Origin, Callable[[VehicleReport], None]], Vehicle],
+    make_vehicle: MakeVehicle,
     stop: StopRequest,
     *,
     save: Callable[[Snapshot], None] | None = None,
@@ -203,8 +206,7 @@ async def run_agent(
         mission: mission name.
         bus: open; closed by the caller.
         clock: gives the core's time.
-        make_vehicle: makes the vehicle once the mission's origin is known, with a
-            callback for its reports.
+        make_vehicle: makes the vehicle once the mission is known.
         stop: asks to leave early: the vehicle is told to return first, and seen to.
         save: keeps what the core knows for its next life.
         answer_s: how long a question waits for the slowest answer [wall s].
@@ -235,7 +237,7 @@ async def run_agent(
 
 
 class _Flight:
-    """An agent's shell and, once the mission's origin is known, its vehicle; see `run_agent`."""
+    """An agent's shell and, once the mission is known, its vehicle; see `run_agent`."""
 
     def __init__(
         self,
@@ -243,7 +245,7 @@ class _Flight:
         bus: Bus,
         clock: Clock,
         mission: str,
-        make_vehicle: Callable[[Origin, Callable[[VehicleReport], None]], Vehicle],
+        make_vehicle: MakeVehicle,
         *,
         save: Callable[[Snapshot], None] | None,
         answer_s: float,
@@ -279,7 +281,7 @@ class _Flight:
             self.returns.clear()
         flown = not isinstance(order, Return) or order.resume
         if self.vehicle is None and brief is not None and flown:
-            self.vehicle = self._make_vehicle(Origin(*brief.origin), self._report)
+            self.vehicle = self._make_vehicle(brief, self._report)
             self._core.dropped = _Dropped(self.shell, self.vehicle)
             self.starting = asyncio.get_running_loop().create_task(self.vehicle.start())
             self.starting.add_done_callback(self._failed)

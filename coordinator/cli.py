@@ -322,13 +322,12 @@ def coordinator(
     from swarm.runtime.clock import ScaledClock, incarnation
     from swarm.runtime.log import configure_logging, get_logger, identify
     from swarm.runtime.store import Store
-    from swarm.scenario import load_scenario, require_plain
+    from swarm.scenario import load_scenario
 
     configure_logging(log_level, log_format)
     check_online_method(method)
     network = seat.network
     mission = load_scenario(scenario)
-    require_plain(mission, "swarm coordinator")
     config = seat.config(mission=mission.name, roles=(Role.COORDINATOR,))
     timing = network.timing.scaled(speedup)
     timing = replace(timing, hover_s=hover_s * max(1.0, speedup))

@@ -273,11 +273,10 @@ def run(
     from sim.fleet.shown_run import Outputs, ShownRun
     from swarm.protocol.timing import preset
     from swarm.runtime.log import LogFormat, LogLevel, configure_logging
-    from swarm.scenario import load_scenario, require_plain
+    from swarm.scenario import load_scenario
 
     check_flight(method, report, record)
     mission = load_scenario(scenario)
-    require_plain(mission, "swarm run")
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
     check_speedup(autopilots, speedup)

@@ -9,20 +9,20 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from coordinator.core.publication import height_warning
+from sim.fleet.doctor.field import check_field
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 from swarm.identity import Identity, Role, load_identity
 from swarm.identity.folder import shown_time
 from swarm.model import Mission
 from swarm.model.layers import FlightLayers
 from swarm.runtime.errors import InputError
-from swarm.scenario import load_scenario, require_plain
+from swarm.scenario import load_scenario
 
 
 def check_scenario(path: Path) -> tuple[Mission | None, list[CheckFinding]]:
     """The mission, if the file is sound, and what is to be said of it."""
     try:
         mission = load_scenario(path)
-        require_plain(mission, "swarm doctor")
     except InputError as error:
         return None, [
             fails(
@@ -41,6 +41,7 @@ def check_scenario(path: Path) -> tuple[Mission | None, list[CheckFinding]]:
     if (warning := height_warning(mission, FlightLayers())) is not None:
         problem, _, remedy = warning.partition(": ")
         found.append(warns("height", problem, remedy))
+    found += check_field(mission)
     return mission, found
 
 

@@ -31,7 +31,7 @@ from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.events import Stop
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.messages import Message, MissionPhase, Snapshot
+from swarm.protocol.messages import Message, MissionConfig, MissionPhase, Snapshot
 from swarm.protocol.timing import Timing
 from swarm.runtime.errors import BusError
 from swarm.runtime.process import StopRequest
@@ -127,8 +127,8 @@ async def at_work(
     core = AgentCore(MISSION, "u0", 1, Timing(), memory)
     stop, vehicles, clock = StopRequest(), list[FakeVehicle](), HandClock()
 
-    def make_vehicle(origin: Origin, report: Callable[[VehicleReport], None]) -> FakeVehicle:
-        vehicles.append(FakeVehicle(origin, report, broken, stays_away))
+    def make_vehicle(told: MissionConfig, report: Callable[[VehicleReport], None]) -> FakeVehicle:
+        vehicles.append(FakeVehicle(Origin(*told.origin), report, broken, stays_away))
         return vehicles[-1]
 
     agent = run_agent(core, MISSION, seat, clock, make_vehicle, stop, save=save)
