@@ -15,8 +15,8 @@ decide.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -40,19 +40,32 @@ _SLACK_M = 1e-3
 _MARGIN_SLACK_FRAC = 1e-3
 """Chains of chords in the place of round corners."""
 _SAME_BASE_M = 1.0
-_PATIENCE = 3.0
-"""Who leaves a zone may take so many times as long as in calm air: wind, and a slow vehicle."""
 
 
 @dataclass(frozen=True, slots=True)
 class FieldJudge:
-    """Judges one world that is over."""
+    """Judges one world that is over.
+
+    What an agent can promise of zones follows from what it knows. It knows where its vehicle was
+    ``stale_s`` ago or less. Who is sent elsewhere in flight therefore flies from up to
+    speed · ``stale_s`` beside where its way was reckoned from, and so far beside that way at most:
+    to be kept out by more than that is what a margin is for.
+
+    Whoever hears of a zone that it is in orders its way out in the step in which it hears of it,
+    or, if it has to ask others first what it has missed, when they have answered: at the latest
+    ``reaction_s`` later. Then its vehicle stops, and flies the shortest way out from rest; see
+    `_leaves_s` for how long that takes.
+    """
 
     world: World
     time_s: float = 1e-5
     """What is forgiven of windows: agents' clocks are not the world's [s]."""
     reaction_s: float = 5.0
-    """Until when everybody has heard of a zone, and changed its course [s]."""
+    """Until when everybody has heard of a zone, and ordered its way out [s]."""
+    stale_s: float = 0.0
+    """How old what an agent knows of its vehicle's place may be [s]."""
+    slowed: Mapping[str, float] = field(default_factory=dict)
+    """By UAV: the least share of its speed at which it flew, if it is not all of it."""
 
     def complaints(self, zones: Sequence[DrawnZone] | None = None) -> list[tuple[str, str]]:
         """Invariants that were broken, and how.
@@ -73,9 +86,10 @@ class FieldJudge:
 
     def _intrusions(self, zones: Sequence[DrawnZone]) -> Iterable[str]:
         margin_m = self.world.mission.zone_margin_m
+        speeds_m_s = {str(uav.id): uav.speed_m_s for uav in self.world.mission.uavs}
         for drawn in zones:
-            forbidden = _forbidden(drawn.zone, margin_m)
             for uav, track in self.world.tracks.items():
+                forbidden = _forbidden(drawn.zone, margin_m, self.stale_s * speeds_m_s[uav])
                 since_s = drawn.heeded_by_s(uav, self.reaction_s)
                 if since_s == math.inf:
                     continue
@@ -89,19 +103,28 @@ class FieldJudge:
                         break
 
     def _leaves_s(self, uav: str, since_s: float, forbidden: shapely.Geometry) -> float:
-        """By when it must have left what has been drawn over it; 0 if it is outside."""
+        """By when it must have left what has been drawn over it [s]; 0 if it is outside.
+
+        At ``since_s`` its way out is ordered at the latest, wherever it was going. With the speed
+        v, the acceleration a and d from the border it takes v / a to stop, v² / 2a farther in at
+        worst, and then the time of a leg of d + v² / 2a from rest. In wind the way out may lead
+        against it: the speed over ground is the airspeed less the wind's, or more.
+        """
         import shapely
 
         place = self.world.tracks[uav].position_enu_m(since_s)
         if place is None or not shapely.intersects(forbidden, shapely.Point(place[:2])):
             return 0.0
         row = next(each for each in self.world.mission.uavs if each.id == uav)
+        speed_m_s, a_m_s2 = row.speed_m_s, row.acceleration_m_s2
+        if row.airspeed_m_s is not None:
+            against_m_s = row.airspeed_m_s - math.hypot(*self.world.mission.wind_enu_m_s)
+            speed_m_s = min(speed_m_s, against_m_s)
+        stops_s = 0.0 if a_m_s2 is None else row.speed_m_s / a_m_s2
         out_m = float(shapely.distance(shapely.boundary(forbidden), shapely.Point(place[:2])))
-        return (
-            since_s
-            + self.reaction_s
-            + _PATIENCE * flown_s(out_m, row.speed_m_s, row.acceleration_m_s2)
-        )
+        out_m += row.speed_m_s * (stops_s / 2.0 + self.stale_s)
+        takes_s = flown_s(out_m, speed_m_s, a_m_s2) / self.slowed.get(uav, 1.0)
+        return since_s + stops_s + takes_s
 
     # -- times --------------------------------------------------------------------------
 
@@ -135,11 +158,11 @@ class FieldJudge:
                     yield f"{', '.join(here)} stand at {base.id} at {stay.begin_s:.3f} s"
 
 
-def _forbidden(zone: Zone, margin_m: float) -> shapely.Geometry:
-    """Where a path may not be."""
+def _forbidden(zone: Zone, margin_m: float, astray_m: float) -> shapely.Geometry:
+    """Where a path may not be that is flown so far astray at most."""
     import shapely
 
-    slack_m = _SLACK_M + _MARGIN_SLACK_FRAC * margin_m
+    slack_m = _SLACK_M + _MARGIN_SLACK_FRAC * margin_m + astray_m
     shape = zone.shape()
     if not zone.inclusive:
         return shapely.buffer(shape, margin_m - slack_m, quad_segs=64)
@@ -180,18 +203,33 @@ class Chances:
     """What UAVs could still have done when they were sent home for good.
 
     *left undone*: in the end no task without due time is open that some UAV could have done then,
-    from its place and charge, as its only one, over as many bases as that takes, every slot free.
+    from its place and charge, as its only one, over as many bases as that takes, every slot free
+    but those on which the lost stand.
 
     Args:
         mission: with the zones that counted then.
         zero_s: mission time 0 in the time of what was seen [s].
+        slack_s: who could have done it only to so many seconds is not held to it [s].
+        blocked: bases on all of whose slots lost UAVs stand.
     """
 
-    def __init__(self, mission: Mission, zero_s: float) -> None:
+    def __init__(
+        self, mission: Mission, zero_s: float, slack_s: float = 1.0, blocked: Collection[str] = ()
+    ) -> None:
         layers = FlightLayers()
         self._layers_m = [layers.layer_m(place) for place in range(len(mission.uavs))]
         self._mission, self._zero_s = mission, zero_s
         self._problem = FieldProblem.from_mission(mission)
+        self._slack_s = slack_s
+        self._swaps = np.array([base.id not in blocked for base in mission.bases], dtype=np.bool_)
+
+    def can_go_on(self, seen: LastSeen, uav: str, task: str) -> bool:
+        """Whether ``uav`` can do ``task`` at once, without another battery, before it is due."""
+        row = [str(each) for each in self._problem.uav_ids].index(uav)
+        column = [str(each.id) for each in self._mission.tasks].index(task)
+        due_s = self._mission.tasks[column].due_s
+        ends_s = self._ends_s(row, column, seen, visits=0)
+        return ends_s < (math.inf if due_s is None else due_s - self._slack_s)
 
     def could_do(self, seen: dict[str, LastSeen], tasks: Collection[str]) -> dict[str, list[str]]:
         """By task without due time: who could have done it."""
@@ -201,12 +239,16 @@ class Chances:
                 continue
             for column, task in enumerate(self._mission.tasks):
                 wanted = task.id in tasks and task.due_s is None
-                if wanted and self._ends_s(row, column, seen[uav]) < math.inf:
+                ends_s = self._ends_s(row, column, seen[uav], self._problem.n_base)
+                if wanted and ends_s < math.inf:
                     found.setdefault(task.id, []).append(uav)
         return found
 
-    def _ends_s(self, row: int, column: int, seen: LastSeen) -> float:
-        """When that UAV would have ended that task [s mission time]; infinite: it can't."""
+    def _ends_s(self, row: int, column: int, seen: LastSeen, visits: int) -> float:
+        """When that UAV would have ended that task [s mission time]; infinite: it can't.
+
+        After so many ``visits`` to bases at most.
+        """
         problem, uav = self._problem, self._mission.uavs[row]
         if not problem.capable[row, column]:
             return math.inf
@@ -223,15 +265,15 @@ class Chances:
             legs_s = self._legs_from_s(row, seen)
             best_s = self._work_s(row, column, legs_s, now_s, left_s, landed=False)
             to_s = legs_s[problem.n_uav : problem.n_uav + problem.n_base]
-            there = to_s <= left_s + 1e-6
+            there = (to_s <= left_s + 1e-6) & self._swaps & (visits > 0)
             ready_s[there] = now_s + to_s[there] + problem.swap_s[there]
         elif base is not None:
             ready_s[base] = now_s
-        for _ in range(problem.n_base):
+        for _ in range(visits):
             for here in np.flatnonzero(np.isfinite(ready_s)).tolist():
                 legs_s = problem.leg_s[problem.kind[row], problem.n_uav + here]
                 to_s = legs_s[problem.n_uav : problem.n_uav + problem.n_base]
-                there = to_s <= problem.full_s[row] + 1e-6
+                there = (to_s <= problem.full_s[row] + 1e-6) & self._swaps
                 later_s = ready_s[here] + to_s + problem.swap_s
                 ready_s = np.where(there, np.minimum(ready_s, later_s), ready_s)
         for here in np.flatnonzero(np.isfinite(ready_s)).tolist():
@@ -261,8 +303,8 @@ class Chances:
             line_s = float(problem.line_s[problem.kind[row], column, way])
             end_s = begin_s + line_s + float(problem.service_s[column])
             back_s = float(problem.home_s[row, leave])
-            # Who could have done it only to the second is not held to it.
-            if begin_s < closes_s - 1.0 and end_s - depart_s + back_s < left_s - 1.0:
+            spare_s = left_s - self._slack_s
+            if begin_s < closes_s - self._slack_s and end_s - depart_s + back_s < spare_s:
                 best_s = min(best_s, end_s)
         return best_s
 

@@ -42,6 +42,8 @@ class FaultInjector:
         """What the operator has drawn in flight, whoever knows of it."""
         self.drained: set[str] = set()
         """UAVs whose batteries drain faster than planned."""
+        self.slowed: dict[str, float] = {}
+        """By UAV that flies more slowly: the least share of its speed."""
         self._world = world
         self._network = network
         self._disturbed_s = 0.0
@@ -92,7 +94,9 @@ class FaultInjector:
             case DisturbanceKind.SKEW:
                 world.skew(names[0], what.amount or 0.0)
             case DisturbanceKind.SLOW:
-                world.slow(names[0], what.amount or 1.0)
+                share = what.amount or 1.0
+                self.slowed[names[0]] = min(share, self.slowed.get(names[0], 1.0))
+                world.slow(names[0], share)
             case DisturbanceKind.REFUSE:
                 refusal = names[0], names[1]
                 world.refuses.add(refusal)

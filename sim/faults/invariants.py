@@ -30,6 +30,7 @@ from __future__ import annotations
 
 import itertools
 import traceback
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -61,6 +62,8 @@ STEPS_AT_ONCE = 3000
 """More steps of all processes without time passing are a loop."""
 _LATE_S = 2.0
 """What is forgiven of windows: clocks jump, and words are late."""
+TELEMETRY_GAP_S = 0.2
+"""Agents hear that often where their vehicles are."""
 _IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
 
 
@@ -141,9 +144,8 @@ class InvariantChecker:
 
     def refused(self, process: Process, order: GoTo) -> None:
         """The vehicle of ``process`` will not obey."""
-        for task in self._world.mission.tasks:
-            if task.position_enu_m[:2] == order.position_enu_m[:2]:
-                self.message_log.refused(process.name, task.id)
+        if order.task is not None:
+            self.message_log.refused(process.name, order.task)
 
     def noted(self, process: Process, note: LogLine) -> None:
         """``process`` has written a line into its log."""
@@ -151,17 +153,30 @@ class InvariantChecker:
             self._break("impossible", f"{process.name}: {note.fields}")
         if note.text == "lost":
             self.message_log.missed(process.name)
-        if note.text == "released":
-            reason, task = str(note.fields["reason"]), str(note.fields["task"])
-            drained = process.name in self._injector.drained and "battery" in reason
-            if drained or (self._injector.drawn and "zone" in reason):
-                self.message_log.gave_up(process.name, task)
+        released = note.fields.get("task") if note.text == "released" else None
+        if released is not None and not self._can_go_on(process, str(released)):
+            self.message_log.gave_up(process.name, str(released))
         if note.text == "turns aside":
             self.message_log.turned_aside(self._now_s, process.name, str(note.fields["task"]))
             self._stop_if_broken()
         if note.text == "lost" and not process.linked:
             text = f"{process.name} gives {note.fields['writer']} up while its own link is down"
             self._break("suspects without link", text)
+
+    def _can_go_on(self, process: Process, task: str) -> bool:
+        """Whether constraints still allow the UAV of ``process`` the task that it leaves.
+
+        From where its vehicle truly is, on what is left of its battery, round the zones that its
+        agent knows of. In a plain mission nothing forbids a task.
+        """
+        world, core, seen = self._world, process.core, self._world.seen(process.name)
+        if not is_field(world.mission) or seen is None or not isinstance(core, AgentCore):
+            return True
+        tasks = {str(each.id): each for each in (*world.mission.tasks, *self._added())}
+        zones = tuple(zone.zone() for zone in zones_in_force(core.replica))
+        mission = replace(world.mission, tasks=tuple(tasks.values()), zones=zones)
+        chances = Chances(mission, world.zero_s or 0.0, slack_s=_LATE_S)
+        return task not in tasks or chances.can_go_on(seen, process.name, task)
 
     def _look(self) -> None:
         if self._world.alive:
@@ -265,16 +280,12 @@ class InvariantChecker:
             for uav, core in world.agents.items()
             if core.replica.epoch is not None
         }
-        added = {
-            task: order
-            for task, order in message_log.ordered.items()
-            if task not in message_log.posted
-        }
+        added = self._added()
+        added_ids = {str(task.id) for task in added}
         known_at_the_end = set[str]().union(*self._known_at_the_end.values())
         tasks = [task for task in world.mission.tasks if task.id in message_log.posted]
-        tasks += [Task(TaskId(task), added[task].position_enu_m, 0.0) for task in added]
-        for task in tasks:
-            unheard = task.id in added and task.id not in known_at_the_end
+        for task in (*tasks, *added):
+            unheard = task.id in added_ids and task.id not in known_at_the_end
             if task.id in settled or (message_log.ended and unheard):
                 continue
             able = [
@@ -298,9 +309,37 @@ class InvariantChecker:
             if uav in uavs:
                 zones = (*world.mission.zones, *self._drawn_over(uav, seen.at_s))
                 mission = replace(world.mission, tasks=tuple(known.values()), zones=zones)
-                chances = Chances(mission, world.zero_s or 0.0)
+                chances = Chances(mission, world.zero_s or 0.0, blocked=self._blocked(seen.at_s))
                 able += chances.could_do({uav: seen}, [task.id]).get(task.id, [])
         return able
+
+    def _added(self) -> list[Task]:
+        """What the operator has added, and no coordinator posted."""
+        posted, ordered = self.message_log.posted, self.message_log.ordered
+        return [
+            Task(TaskId(task), order.position_enu_m, 0.0)
+            for task, order in ordered.items()
+            if task not in posted
+        ]
+
+    def _blocked(self, at_s: float) -> set[str]:
+        """Bases on all of whose slots lost UAVs stood then, until a person takes them away."""
+        stands = Counter(
+            stay.base
+            for stay in self._world.flight_log.stays
+            if stay.begin_s <= at_s < stay.end_s and self._is_lost(stay.uav)
+        )
+        return {
+            base.id
+            for base in self._world.mission.bases
+            if base.slots is not None and stands[base.id] >= base.slots
+        }
+
+    def _is_lost(self, uav: str) -> bool:
+        """Whether nobody speaks for ``uav`` any more, and it did not end by itself."""
+        process = self._world.processes[uav]
+        silent = process.over or process in self._injector.held_for_good
+        return silent and uav not in self._world.finished
 
     def _drawn_over(self, uav: str, at_s: float) -> Iterator[Zone]:
         """Zones drawn in flight that may have kept ``uav`` from what it left undone then."""
@@ -315,7 +354,10 @@ class InvariantChecker:
             known_s = self._zone_known_s.get(drawn.zone.id, {})
             heed = {uav: s for uav, s in known_s.items() if uav not in self._injector.left_alone}
             zones.append(replace(drawn, known_s=heed))
-        for invariant, text in FieldJudge(self._world, time_s=_LATE_S).complaints(zones):
+        judge = FieldJudge(
+            self._world, _LATE_S, stale_s=TELEMETRY_GAP_S, slowed=self._injector.slowed
+        )
+        for invariant, text in judge.complaints(zones):
             uav = text.partition(" ")[0]
             if not (invariant == "fell" and uav in self._injector.left_alone):
                 self._break(invariant, text)

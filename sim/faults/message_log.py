@@ -6,9 +6,10 @@
   an earlier one, nor with the same stamp and other contents; words of an earlier life that
   nobody was there to hear do not count, as nobody is deaf to what is said below them;
 - *keeps its task*: a UAV leaves a task it claimed only when the task is done or withdrawn,
-  another has a stronger claim on it, its vehicle refused, its process started anew, the
-  operator has said so, or the mission has ended for it; or, once for each task that appears and
-  each loss it learns of, in flight for something better; so never because of re-planning.
+  another has a stronger claim on it, its vehicle refused, windows, its battery or zones do not
+  allow it any more, its process started anew, the operator has said so, or the mission has ended
+  for it; or, once for each task that appears and each loss it learns of, in flight for something
+  better; so never because of re-planning.
 
 It knows no process from within, so recordings of real ones can be told as well.
 """
@@ -106,7 +107,7 @@ class MessageLog:
         self._left.add((uav, task))
 
     def gave_up(self, uav: str, task: str) -> None:
-        """``uav`` can't do ``task`` any more: its battery drains faster, or a zone was drawn."""
+        """``uav`` can't do ``task`` any more, in time, on its battery or round zones."""
         self._left.add((uav, task))
 
     def missed(self, uav: str) -> None:

@@ -41,7 +41,7 @@ from coordinator.operator.requests import OperatorClient, OperatorRequest
 from sim.world.closest_approach import closest_approach
 from sim.world.engine import EventQueue, LocalClock, Process
 from sim.world.field_vehicle import FieldVehicle
-from sim.world.flight_log import FlightLog
+from sim.world.flight_log import FlightLog, LastSeen
 from sim.world.network import IdealNetwork
 from sim.world.settings import (
     QUIET,
@@ -159,6 +159,15 @@ class World:
         """The latest core of every UAV."""
         cores = {name: process.core for name, process in self.processes.items()}
         return {name: core for name, core in cores.items() if isinstance(core, AgentCore)}
+
+    def seen(self, uav: str) -> LastSeen | None:
+        """Where the vehicle of ``uav`` is now; None before its first lift-off, and once lost."""
+        vehicle, track = self._vehicles.get(uav), self.tracks.get(uav)
+        told = None if vehicle is None else vehicle.telemetry()
+        if told is None:
+            return None
+        flies, now_s = track is None or track.airborne, self.queue.now_s()
+        return LastSeen(now_s, told.position_enu_m, told.battery_frac, flies)
 
     def executed_schedule(self) -> Schedule:
         """Where UAVs went, when, and what they did there, in mission time."""

@@ -121,23 +121,46 @@ class Obstacles:
     def way_out_m(self, place_m: FloatArray) -> FloatArray:
         """(2,) the nearest place [m] to a (2,) place inside that is outside of every shape.
 
-        The margin's round corners are cut into chords here, which lie at most 0.01 % of the margin
-        further out. Whoever has nowhere to go stays where it is.
+        If the straight way there leads through shapes that the place is not in, and another way
+        out does not, the nearest such. The margin's round corners are cut into chords here, which
+        lie at most 0.01 % of the margin further out. Whoever has nowhere to go stays where it is.
         """
         import shapely
 
-        out = shapely.shortest_line(self._border, shapely.Point(place_m))
+        point = shapely.Point(place_m)
+        out = shapely.shortest_line(self._border, point)
+        if self._enters(out, point):
+            holds = shapely.intersects(self._solids_with_margin, point)
+            within, others = self._solids_with_margin[holds], self._solids_with_margin[~holds]
+            border = shapely.boundary(shapely.union_all(within))
+            border = shapely.difference(border, shapely.union_all(others))
+            other = shapely.shortest_line(border, point)
+            if other is not None and not other.is_empty and not self._enters(other, point):
+                out = other
         out_m = np.array(out.coords[0])
         return out_m if self.free(out_m[None])[0] else np.array(place_m, dtype=np.float64)
 
+    def _enters(self, way: shapely.Geometry, begin: shapely.Geometry) -> bool:
+        """Whether ``way`` comes into a shape in which it does not begin."""
+        return any(
+            bool(self._inside(number, way)) and not bool(self._inside(number, begin))
+            for number in range(len(self._shapes))
+        )
+
     @cached_property
-    def _border(self) -> shapely.Geometry:
-        """Of all shapes together, with their margin and a little more."""
+    def _solids_with_margin(self) -> npt.NDArray[np.object_]:
+        """And a little more."""
         import shapely
 
         reach_m = (self.margin_m + TOUCH_M) / np.cos(np.pi / (4 * _ROUND_STEPS))
-        shapes = shapely.buffer(self._solids, reach_m, quad_segs=_ROUND_STEPS)
-        return shapely.boundary(shapely.union_all(shapes))
+        return np.asarray(shapely.buffer(self._solids, reach_m, quad_segs=_ROUND_STEPS))
+
+    @cached_property
+    def _border(self) -> shapely.Geometry:
+        """Of all shapes together."""
+        import shapely
+
+        return shapely.boundary(shapely.union_all(self._solids_with_margin))
 
     def _near(self, low_m: FloatArray, high_m: FloatArray) -> BoolArray:
         """(n, shapes) whose bounding boxes meet those from (n, 2) ``low_m`` to ``high_m``."""
