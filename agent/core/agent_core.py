@@ -16,7 +16,15 @@ from collections.abc import Iterable, Mapping
 from agent.core.announcer import Announcer
 from agent.core.context import AgentContext, AgentPart
 from agent.core.field_tasking import FieldTasking
-from agent.core.interface import Action, Event, OrderVehicle, Telemetry
+from agent.core.interface import (
+    Action,
+    Event,
+    KeepOut,
+    OrderVehicle,
+    Return,
+    Telemetry,
+    VehicleOrder,
+)
 from agent.core.memory import RecoveredState, SaveCondition
 from agent.core.mission_view import MissionView, Peers
 from agent.core.state_sync import StateSync
@@ -44,8 +52,9 @@ from swarm.protocol.events import (
     Stop,
     Tick,
 )
+from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import CommandKind, Message, Snapshot
-from swarm.protocol.operator_commands import describe_command
+from swarm.protocol.operator_commands import describe_command, zones_in_force
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import StallDetector, Timing, earliest
@@ -69,6 +78,8 @@ class AgentCore(AgentPart):
             is nothing.
         memory_age_s: how long ago that was kept.
         rejoin: take part again, although an earlier life left this flight of the mission.
+        path_clearance_m: how much farther than their margin ways lead past zones, for vehicles
+            that do not fly quite where they are told.
         without_bus_s: go home when the own link to the bus has been down for that long; None
             to fly on.
         make_rule: what it decides by in an epoch of that rule and those routes. Every UAV of a
@@ -87,6 +98,7 @@ class AgentCore(AgentPart):
         rejoin: bool = False,
         without_bus_s: float | None = None,
         make_rule: RuleMaker = rule_of,
+        path_clearance_m: float = 0.0,
     ) -> None:
         self.uav = uav
         self.replica = Replica()
@@ -104,6 +116,7 @@ class AgentCore(AgentPart):
             peers=Peers(uav, timing),
             announcer=Announcer(RegisterWriter(mission, uav, incarnation), self.replica, timing),
             machine=AgentStateMachine(self._note_impossible),
+            path_clearance_m=path_clearance_m,
         )
         super().__init__(context)
         self._tasking = FieldTasking(context, make_rule)
@@ -117,6 +130,9 @@ class AgentCore(AgentPart):
         self._bus_loss = BusLossTimer(without_bus_s)
         self._stall_detector = StallDetector(timing.pause_s)
         self._deadline_s: float | None = None
+        self._has_vehicle = False
+        """Whether a vehicle was ordered to fly, which there is from then on."""
+        self._told_zones: tuple[ZoneSpec, ...] = ()
 
     # -- the one entry point ------------------------------------------------------
 
@@ -399,10 +415,22 @@ class AgentCore(AgentPart):
     def _note_impossible(self, state: AgentState, trigger: Trigger) -> None:
         self._log(IMPOSSIBLE, state=state.name, trigger=trigger.name)
 
+    def _tell_zones(self, actions: list[Action]) -> None:
+        """Before it is ordered anything else, the vehicle learns where not to fly."""
+        orders = [action.order for action in actions if isinstance(action, OrderVehicle)]
+        self._has_vehicle |= any(map(_begins_flight, orders))
+        zones = zones_in_force(self.replica) if orders and self._has_vehicle else self._told_zones
+        brief = self.replica.brief
+        if zones != self._told_zones and brief is not None:
+            self._told_zones = zones
+            known = tuple(zone.zone() for zone in zones)
+            actions.insert(0, OrderVehicle(KeepOut(known, brief.zone_margin_m)))
+
     def _end_step(self, now_s: float) -> list[Action]:
         """What came of the step; a change worth it is kept for a later life."""
         actions = self._actions.copy()
         self._actions.clear()
+        self._tell_zones(actions)
         remembers = self.state not in (AgentState.SYNCING, AgentState.YIELDED)
         if remembers and self._saving.worth_keeping(actions, now_s):
             actions.insert(0, Save())
@@ -412,6 +440,11 @@ class AgentCore(AgentPart):
         self._deadline_s = self._earliest_deadline_s()
         self._stall_detector.expect_by(self._deadline_s)
         return actions
+
+
+def _begins_flight(order: VehicleOrder) -> bool:
+    """Whether there is a vehicle from then on: a return alone asks for none."""
+    return not isinstance(order, Return) or order.resume
 
 
 def _place(action: Action) -> int:

@@ -68,6 +68,8 @@ class BaseVisits(AgentPart):
         """Whether the vehicle stands at the base; None: as an earlier life has claimed."""
         self._vouched: dict[str, tuple[Stamp, Claim | None]] = {}
         """By UAV, the operator's last word that it is ready, and what it claimed at the time."""
+        self._word: Stamp | None = None
+        """The operator's last word about the own UAV that counts no more."""
 
     # -- what is known -------------------------------------------------------------------
 
@@ -214,6 +216,8 @@ class BaseVisits(AgentPart):
         if visit.waited_at_s is not None and visit.waited_at_s <= now_s:
             visit.waited_at_s, visit.waited = None, True
         base = self._base()
+        if self._machine.state is AgentState.SWAPPING:
+            self._let_start_if_told()
         if self._machine.state is AgentState.BESIDE_SLOTS and base is not None:
             self._wait_on_ground(base, now_s)
             return
@@ -265,7 +269,7 @@ class BaseVisits(AgentPart):
         self._machine.take(Trigger.SLOT_FREE)
         ready_s = self._mission_view.mission_s(now_s) + base.swap_s
         self._announcer.explain(f"swaps its battery at base {base.id}")
-        self._flights.swap(base)
+        self._swap(base)
         held = replace(claim, phase=ClaimPhase.HELD, completion_s=ready_s)
         self._say(replace(held, stage=BaseStage.LANDED))
         self._log("lands", base=base.id)
@@ -295,6 +299,19 @@ class BaseVisits(AgentPart):
         ready_s = max([self._mission_view.mission_s(now_s), *free_s]) + base.swap_s
         held = replace(claim, phase=ClaimPhase.HELD, completion_s=ready_s)
         self._say(replace(held, stage=BaseStage.PARKED))
+
+    def _swap(self, base: BaseSpec) -> None:
+        """Land, or stand there; what was said of the UAV before was of an earlier stay."""
+        self._word = readiness(self._replica).get(self._uav)
+        self._flights.swap(base)
+
+    def _let_start_if_told(self) -> None:
+        """Pass on the operator's word that it may start again."""
+        word = readiness(self._replica).get(self._uav)
+        if word is not None and word != self._word:
+            self._word = word
+            self._flights.let_start()
+            self._log("may start again")
 
     def _wait_on_ground(self, base: BaseSpec, now_s: float) -> None:
         if not self.is_blocked(base):
@@ -330,7 +347,7 @@ class BaseVisits(AgentPart):
         self._sortie.land()
         self._mission_view.stand(base.position_enu_m)
         self._announcer.explain(f"stands at base {base.id}")
-        self._flights.swap(base)
+        self._swap(base)
         mission_s = self._mission_view.mission_s(now_s)
         ready_s = mission_s + base.swap_s
         self._say(Claim(ClaimPhase.HELD, None, mission_s, 0, ready_s, base=base.id, stage=stage))

@@ -27,6 +27,8 @@ class AgentContext:
     peers: Peers
     announcer: Announcer
     machine: AgentStateMachine
+    path_clearance_m: float = 0.0
+    """How much farther than their margin ways lead past zones [m]."""
     actions: list[Action] = field(default_factory=list)
     """What has come of the step so far, in order."""
 

@@ -6,10 +6,11 @@ decisions are made, so a UAV flies what it reckoned with. Leaves out: why it fli
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from agent.core.context import AgentContext, AgentPart
-from agent.core.interface import GoTo, Return, Swap
+from agent.core.interface import GoTo, Ready, Return, Swap
+from agent.core.path_clearance import PathClearance
 from swarm.allocation.field import FieldProblem
 from swarm.allocation.field.ways import Way, base_node, task_nodes, way_home, way_to
 from swarm.model import TaskId, UavId
@@ -43,6 +44,9 @@ class Flights(AgentPart):
         self._home: HomeFlight | None = None
         self._home_from: object = None
         """Place and problem of that way home."""
+        self._clearance_m = context.path_clearance_m
+        self._clearance: PathClearance | None = None
+        self._clearance_of: FieldProblem | None = None
 
     # -- what is known of the field -------------------------------------------------------
 
@@ -102,7 +106,7 @@ class Flights(AgentPart):
         if problem is None or place_enu_m is None:
             return None
         if self._home_from != (place_enu_m, id(problem)):
-            way = way_home(problem, self._row(problem), place_enu_m)
+            way = self._widened(way_home(problem, self._row(problem), place_enu_m))
             self._home_from = place_enu_m, id(problem)
             self._home = (
                 None
@@ -123,7 +127,25 @@ class Flights(AgentPart):
         problem, place_enu_m = self.problem, self._mission_view.place_enu_m
         if problem is None or place_enu_m is None:
             return None
-        return way_to(problem, self._row(problem), place_enu_m, node)
+        return self._widened(way_to(problem, self._row(problem), place_enu_m, node))
+
+    def _widened(self, way: Way | None) -> Way | None:
+        """That way as a vehicle is led that does not fly quite where it is told."""
+        problem, brief, place_enu_m = (
+            self.problem,
+            self._replica.brief,
+            self._mission_view.place_enu_m,
+        )
+        if way is None or not self._clearance_m or brief is None or place_enu_m is None:
+            return way
+        if self._clearance is None or self._clearance_of is not problem:
+            zones = [zone.zone() for zone in zones_in_force(self._replica)]
+            margin_m = brief.zone_margin_m
+            self._clearance = PathClearance(zones, margin_m, self._clearance_m)
+            self._clearance_of = problem
+        begin_enu_m = self._mission_view.in_layer(place_enu_m)
+        points = self._clearance.widened((begin_enu_m, *way.via_enu_m, way.end_enu_m))
+        return replace(way, via_enu_m=points[1:-1])
 
     def _row(self, problem: FieldProblem) -> int:
         return problem.uav_ids.index(UavId(self._uav))
@@ -172,7 +194,13 @@ class Flights(AgentPart):
     def swap(self, base: BaseSpec) -> None:
         """Land at a base, and get another battery."""
         self.leg += 1
-        self._order(Swap(self.leg, base.position_enu_m))
+        me = self._mission_view.me
+        speed_m_s = None if me is None else me.speed_m_s
+        self._order(Swap(self.leg, base.position_enu_m, base.swap_s, speed_m_s))
+
+    def let_start(self) -> None:
+        """A person has seen to the vehicle, which stands at a base."""
+        self._order(Ready(self.leg))
 
     def land_beside(self, base: BaseSpec) -> None:
         """Land at a base without taking any of its slots."""

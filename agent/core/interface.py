@@ -66,9 +66,9 @@ class Swap:
     """Number of this order; `Landed` and `Swapped` repeat it."""
     position_enu_m: tuple[float, float, float]
     """The place on the ground [m; mission origin, height included]."""
-    swap_s: float = field(default=0.0, repr=False)
+    swap_s: float = field(default=0.0, repr=False, compare=False)
     """How long a battery takes to be changed there [s], for vehicles that start by themselves."""
-    speed_m_s: float | None = field(default=None, repr=False)
+    speed_m_s: float | None = field(default=None, repr=False, compare=False)
     """Cruise ground speed from there on [m/s]; None: as before."""
 
 

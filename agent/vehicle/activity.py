@@ -24,6 +24,8 @@ class FlightPhase(Enum):
     FLYING = "flying"
     HOLDING = "being stopped"
     RETURNING = "returning"
+    LANDING = "landing"
+    STANDING = "standing at its base"
     HANDED_OVER = "handed over"
 
 

@@ -36,6 +36,7 @@ from agent.vehicle.contact import Contact, StreamRequests
 from agent.vehicle.conversation import BridgeAction
 from agent.vehicle.firmware import firmware_of
 from agent.vehicle.hand_over import HandOver, HandOverReason, LinkLoss, hand_over
+from agent.vehicle.landing import Landing
 from agent.vehicle.messages import CommandAck, DecodedMessage, GroundHeartbeat, Heartbeat, Position
 from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning
@@ -218,7 +219,7 @@ class Bridge:
         if firmware is None or not activity.in_our_hands or not firmware.airborne(session.vehicle):
             return
         returning = activity if isinstance(activity, Returning) else None
-        if returning is not None and returning.flies_home:
+        if isinstance(activity, Returning | Landing) and activity.flies_home:
             return
         lost = session.safety.position_lost(now_s)
         if lost is not None and returning is None:

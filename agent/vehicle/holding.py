@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 
-from agent.core.interface import Hold, Prepare
+from agent.core.interface import GoTo, Hold, Prepare
 from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import (
     CommandEnded,
@@ -36,6 +36,7 @@ class Holding(Activity):
         motors_asked: the vehicle may be about to arm.
         returning: what goes on if the vehicle cannot be stopped.
         prepare_next: ordered of a vehicle that has to be stopped first.
+        go_next: alike.
     """
 
     phase = FlightPhase.HOLDING
@@ -51,11 +52,13 @@ class Holding(Activity):
         motors_asked: bool = False,
         returning: Returning | None = None,
         prepare_next: Prepare | None = None,
+        go_next: GoTo | None = None,
     ) -> None:
         super().__init__(session)
         self.order = order
         self.returning = returning
         self.prepare_next = prepare_next
+        self.go_next = go_next
         self._firmware = firmware
         self._leaves = leaves
         self._motors_asked = motors_asked

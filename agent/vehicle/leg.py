@@ -1,4 +1,4 @@
-"""One flight to one place: by a reposition command, or by a mission that ends at home.
+"""One flight to one place: by reposition commands, or by a mission that ends at home.
 
 Arrival is judged by the vehicle's own position and speed against this target, and only after
 the vehicle took it: a vehicle that still flies elsewhere has not arrived, wherever it happens
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from enum import Enum, auto
 
 from agent.core.interface import Arrived, GoTo, HandedOver, Refused
@@ -17,6 +18,7 @@ from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import CommandEnded, CommandOutcome
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
+from agent.vehicle.flight_path import FlightPath
 from agent.vehicle.messages import Inbound, Position, StatusText
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.session import VehicleSession
@@ -197,6 +199,68 @@ class RepositionLeg(_Leg):
             self._failure = self._arrival.complaint
 
 
+class PathLeg(RepositionLeg):
+    """A path whose corners are told one by one, each before the vehicle stops at the one before.
+
+    Args:
+        path_enu_m: corners, then where to stop [m; mission origin].
+        speed_m_s: cruise ground speed.
+        insists: as for `RepositionLeg`.
+    """
+
+    def __init__(
+        self,
+        session: VehicleSession,
+        firmware: Firmware,
+        path_enu_m: Sequence[Point],
+        speed_m_s: float,
+        *,
+        insists: bool = True,
+    ) -> None:
+        config, acceleration_m_s2 = session.config, session.acceleration_m_s2
+        self._path = FlightPath(path_enu_m, config.corner_m, acceleration_m_s2, session.guard)
+        self._speed_m_s = speed_m_s
+        super().__init__(session, firmware, self._path.aim_enu_m, speed_m_s, insists=insists)
+
+    def start(self) -> None:
+        """Tell the vehicle where it is to fly now."""
+        self._session.sent_to_enu_m.append(self._target_enu_m)
+        super().start()
+
+    def on_position(self, position: Position) -> None:
+        """Turn to the next corner in time; at the last of them, judge arrival."""
+        session = self._session
+        place_enu_m, velocity_enu_m_s = session.place_enu_m, position.velocity_enu_m_s
+        reached_m = session.config.acceptance_radius_m
+        if self.accepted and self._path.advance(place_enu_m, velocity_enu_m_s, reached_m):
+            self._aim_at(self._path.aim_enu_m)
+        elif self._path.is_last:
+            super().on_position(position)
+        elif self.accepted:
+            self._judge_stop(velocity_enu_m_s)
+
+    def _aim_at(self, target_enu_m: Point) -> None:
+        moved, session = self._arrival.moved, self._session
+        self._target_enu_m = target_enu_m
+        self._arrival = ArrivalDetector(target_enu_m, session.config)
+        self._arrival.moved = moved
+        place = wgs84_from_enu(session.config.origin, target_enu_m)
+        self._message = self._firmware.reposition(*place, self._speed_m_s)
+        self._accepted = False
+        self.start()
+
+    def _judge_stop(self, velocity_enu_m_s: Point) -> None:
+        """It may stand still elsewhere than at its corner, which it would not stay at."""
+        session = self._session
+        match self._arrival.judge(session.place_enu_m, velocity_enu_m_s, session.now_s):
+            case ArrivalState.STALLED:
+                self._on_stalled()
+            case ArrivalState.GIVEN_UP:
+                self._failure = self._arrival.complaint
+            case ArrivalState.ARRIVED | ArrivalState.UNDERWAY:
+                pass
+
+
 class _MissionLeg(_Leg):
     """A target that stands on the vehicle, or is on its way there; see `OnboardMission`.
 
@@ -206,6 +270,7 @@ class _MissionLeg(_Leg):
     def __init__(self, session: VehicleSession, order: GoTo, mission: OnboardMission) -> None:
         super().__init__(session, order.position_enu_m)
         self._stay_s = order.stay_s
+        self._via_enu_m = order.via_enu_m
         self._mission = mission
 
     @property
@@ -225,10 +290,25 @@ class _MissionLeg(_Leg):
 
     def start(self) -> None:
         """Put the target in force, in place of whatever stands on the vehicle."""
-        self._mission.fly_to(self._target_enu_m, self._stay_s, self._session.cruise_speed_m_s)
+        speed_m_s = self._session.cruise_speed_m_s
+        self._mission.fly_to(self._target_enu_m, self._stay_s, speed_m_s, self._via_enu_m)
 
     def _on_stalled(self) -> None:
         self._mission.restart()
+
+
+def reposition_leg(
+    session: VehicleSession,
+    firmware: Firmware,
+    way_enu_m: Sequence[Point],
+    speed_m_s: float,
+    *,
+    insists: bool,
+) -> RepositionLeg:
+    """To the end of that way, by one target or by one for each corner; see `RepositionLeg`."""
+    if len(way_enu_m) == 1:
+        return RepositionLeg(session, firmware, way_enu_m[0], speed_m_s, insists=insists)
+    return PathLeg(session, firmware, way_enu_m, speed_m_s, insists=insists)
 
 
 class Flying(Activity):
@@ -243,9 +323,10 @@ class Flying(Activity):
         if session.mission is not None:
             self._leg = _MissionLeg(session, order, session.mission)
         else:
-            place = (order.position_enu_m, session.cruise_speed_m_s)
             insists = not firmware.pilots_stop_it_there
-            self._leg = RepositionLeg(session, firmware, *place, insists=insists)
+            way = (*order.via_enu_m, order.position_enu_m)
+            speed_m_s = session.cruise_speed_m_s
+            self._leg = reposition_leg(session, firmware, way, speed_m_s, insists=insists)
 
     def start(self) -> None:
         """Tell the vehicle, in place of whatever it was told before."""

@@ -64,6 +64,8 @@ class MissionSeqs:
     vehicle_items: int
     gives_way: bool = False
     """Whether it gives way to targets before its own place."""
+    corners: int = 0
+    """Waypoints on the way to its place; none where it gives way."""
 
     @property
     def speed(self) -> int:
@@ -73,7 +75,12 @@ class MissionSeqs:
     @property
     def target(self) -> int:
         """The place to fly to and to wait at."""
-        return self.vehicle_items + (3 if self.gives_way else 1)
+        return self.vehicle_items + (3 if self.gives_way else 1) + self.corners
+
+    @property
+    def way(self) -> range:
+        """The place, and the corners on the way there."""
+        return range(self.target - self.corners, self.target + 1)
 
     @property
     def guided(self) -> int | None:
@@ -91,6 +98,13 @@ class MissionSeqs:
         return self.home + 1
 
 
+Corner = tuple[float, float, float]
+"""Latitude, longitude and height above mean sea level [degrees, degrees, m]."""
+
+MOST_CORNERS = 100
+"""Beyond, a path takes too long to be put on a vehicle."""
+
+
 @dataclass(frozen=True, slots=True)
 class MissionPlan:
     """One target, and what to do if nothing follows it."""
@@ -104,10 +118,13 @@ class MissionPlan:
     """Wait at the target before going home [s]; firmwares count whole seconds."""
     guided_s: int = 0
     """Time before for which it gives way to targets [s]; 0: it does not."""
+    corners: tuple[Corner, ...] = ()
+    """Flown through before, without stopping; none where it gives way."""
 
     def seqs(self, firmware: Firmware) -> MissionSeqs:
         """Numbers of its items."""
-        return MissionSeqs(firmware.mission_vehicle_items, self.guided_s > 0)
+        vehicle_items = firmware.mission_vehicle_items
+        return MissionSeqs(vehicle_items, self.guided_s > 0, len(self.corners))
 
     def items(self, firmware: Firmware) -> tuple[MissionItem, ...]:
         """The mission in that firmware's terms."""
@@ -128,18 +145,38 @@ class MissionPlan:
             *vehicles,
             MissionItem(seqs.speed, _CMD_DO_CHANGE_SPEED, *nowhere, speed, current=True),
             *way,
+            *self._corner_items(firmware, seqs),
             MissionItem(seqs.target, _CMD_NAV_WAYPOINT, *place, hold),
             MissionItem(seqs.home, _CMD_NAV_RETURN_TO_LAUNCH, *nowhere),
         )
 
+    def _corner_items(self, firmware: Firmware, seqs: MissionSeqs) -> tuple[MissionItem, ...]:
+        passed = firmware.waypoint_params(0.0)
+        frame = AltitudeFrame.MEAN_SEA_LEVEL
+        return tuple(
+            MissionItem(seq, _CMD_NAV_WAYPOINT, frame, *corner, passed)
+            for seq, corner in zip(seqs.way, self.corners, strict=False)
+        )
+
+
+def _corners_of(way: Sequence[MissionItem]) -> tuple[Corner, ...] | None:
+    """The corners that these items are; None if they are none of ours."""
+    for item in way:
+        waypoint = item.command == _CMD_NAV_WAYPOINT and item.params[0] == 0.0
+        if not waypoint or item.frame is not AltitudeFrame.MEAN_SEA_LEVEL:
+            return None
+    return tuple((item.lat_deg, item.lon_deg, item.alt_m) for item in way)
+
 
 def recognise_plan(items: Sequence[MissionItem], firmware: Firmware) -> MissionPlan | None:
     """The plan that makes such a mission; None if it is not one of ours."""
-    shapes = [MissionSeqs(firmware.mission_vehicle_items, gives_way) for gives_way in (False, True)]
-    if len(items) not in [seqs.count for seqs in shapes]:
+    own = firmware.mission_vehicle_items
+    if not MissionSeqs(own).count <= len(items) <= MissionSeqs(own, corners=MOST_CORNERS).count:
         return None
-    speed, *way, target, home = items[firmware.mission_vehicle_items :]
-    guided_s = _limit_s(way)
+    speed, *way, target, home = items[own:]
+    gives_way = len(way) == 2 and way[0].command == _CMD_DO_GUIDED_LIMITS
+    guided_s = _limit_s(way) if gives_way else 0
+    corners = () if gives_way else _corners_of(way)
     commands = (speed.command, target.command, home.command)
     if commands != (_CMD_DO_CHANGE_SPEED, _CMD_NAV_WAYPOINT, _CMD_NAV_RETURN_TO_LAUNCH):
         return None
@@ -151,16 +188,14 @@ def recognise_plan(items: Sequence[MissionItem], firmware: Firmware) -> MissionP
         and hold_s >= 1.0
         and speed_m_s > 0.0
     )
-    if not ours or guided_s is None:
+    if not ours or guided_s is None or corners is None:
         return None
     place = (target.lat_deg, target.lon_deg, target.alt_m)
-    return MissionPlan(*place, speed_m_s, round(hold_s), guided_s)
+    return MissionPlan(*place, speed_m_s, round(hold_s), guided_s, corners)
 
 
 def _limit_s(way: Sequence[MissionItem]) -> int | None:
     """For how long these items give way to targets; None if they are not ours."""
-    if not way:
-        return 0
     limits, guided = way
     commands = (limits.command, guided.command)
     if commands != (_CMD_DO_GUIDED_LIMITS, _CMD_NAV_GUIDED_ENABLE) or guided.params[0] != _ON:
@@ -304,7 +339,7 @@ class MissionStart:
     @property
     def _is_on_its_way(self) -> bool:
         """Whether it is seen to fly to the place, as a target or as the item."""
-        if self._current == self._seqs.target:
+        if self._current in self._seqs.way:
             # Begun anew it gives way first: this was said before, or its time was over early.
             alone = self._seqs.guided is None or self._sets == 0 or bool(self._told)
             return alone or self._first == self._seqs.target

@@ -16,6 +16,7 @@ Protocol: https://mavlink.io/en/services/mission.html
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from enum import Enum, auto
 
@@ -25,6 +26,7 @@ from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import Heartbeat, Inbound, MissionCurrent, MissionReached, Outbound
 from agent.vehicle.mission_plan import (
     LONGEST_HOLD_S,
+    MOST_CORNERS,
     MissionPlan,
     MissionSeqs,
     MissionStart,
@@ -112,12 +114,28 @@ class OnboardMission:
         """Whether the newest target is what the vehicle is seen to fly to, or to wait at."""
         return self._stage is _Stage.FLOWN and self._wanted == self._standing
 
-    def fly_to(self, target_enu_m: Point, stay_s: float, speed_m_s: float) -> None:
-        """Put a target in force, in place of the last one."""
+    @property
+    def has_corners(self) -> bool:
+        """Whether what stands on the vehicle leads there by corners."""
+        return self._standing is not None and bool(self._standing.corners)
+
+    def fly_to(
+        self,
+        target_enu_m: Point,
+        stay_s: float,
+        speed_m_s: float,
+        via_enu_m: Sequence[Point] = (),
+    ) -> None:
+        """Put a target in force, in place of the last one, and the corners on the way there.
+
+        By corners it is flown as it stands, for only so it is flown to the end if the agent dies.
+        """
         hold_s = math.ceil(stay_s + self._config.mission_patience_s)
         place = wgs84_from_enu(self._config.origin, target_enu_m)
-        guided_s = self._guided_s(target_enu_m, speed_m_s)
-        plan = MissionPlan(*place, speed_m_s, min(max(1, hold_s), LONGEST_HOLD_S), guided_s)
+        guided_s = 0 if via_enu_m else self._guided_s(target_enu_m, speed_m_s)
+        corners = tuple(wgs84_from_enu(self._config.origin, corner) for corner in via_enu_m)
+        wait_s = min(max(1, hold_s), LONGEST_HOLD_S)
+        plan = MissionPlan(*place, speed_m_s, wait_s, guided_s, corners)
         self._awaited, self._renewing = True, False
         self.failure, self.reached, self.unverified = None, False, False
         if self._stage is _Stage.IDLE and self._mode_seen:
@@ -202,7 +220,7 @@ class OnboardMission:
             return
         self._look_at_s = now_s + self._config.retry_delay_s
         own = self._firmware.mission_vehicle_items
-        counts = {MissionSeqs(own, gives_way).count for gives_way in (False, True)}
+        counts = {MissionSeqs(own, corners=corners).count for corners in range(MOST_CORNERS + 1)}
         self._conversation.say(*self._transfer.read(counts, now_s))
 
     def expects(self, custom_mode: int) -> bool:
@@ -315,7 +333,8 @@ class OnboardMission:
             self._stage = _Stage.IDLE
         else:
             # One that gives way is not taken up by itself: it goes on as it was begun.
-            self._begin(again=not self._renewing and self._wanted.guided_s > 0)
+            plan = self._wanted
+            self._begin(again=not self._renewing and (plan.guided_s > 0 or bool(plan.corners)))
 
     def _begin(self, *, again: bool = False) -> None:
         plan = self._standing

@@ -94,6 +94,7 @@ class _Preparation:
         self._mission_begun = False
         self._consent = PilotConsent(firmware, ours=ours or order.resume)
         self._leg: RepositionLeg | None = None
+        self._barred: bool | None = None
         self._speed = CruiseSpeedSetting(order.speed_m_s, firmware, session)
         self._failsafes = FailsafeCheck(firmware, session)
         self.waiting_for = "waiting for the autopilot"
@@ -107,6 +108,11 @@ class _Preparation:
     def caution(self) -> str | None:
         """What people should know of a vehicle that is armed all the same."""
         return self._failsafes.caution
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether somebody else was seen to have armed or flown it."""
+        return self._armed_by_others or self._flown_by_pilot
 
     @property
     def engaged(self) -> bool:
@@ -276,6 +282,7 @@ class _Preparation:
             return self._fail(fault)
         if self._mission is not None and not self._mission.is_uploaded and not self.took_off:
             return self._upload_way_home(self._mission)
+        self._session.launched_enu_m = self._session.known_place_m()
         command = self._firmware.takeoff(self._start_alt_m, home_alt_m(position))
         return self._ask(self._takeoff, command)
 
@@ -308,7 +315,7 @@ class _Preparation:
     def _settle(self) -> None:
         """Fly to the start, unless the vehicle is resumed in the air, and set the speed."""
         order, speed = self._order, self._speed
-        if self._leg is None and not self._resumes:
+        if self._leg is None and not self._resumes and not self._is_barred:
             place = (order.position_enu_m, order.speed_m_s)
             self._leg = RepositionLeg(self._session, self._firmware, *place)
             self._leg.start()
@@ -326,6 +333,14 @@ class _Preparation:
             return
         self.done = there
         self.waiting_for = "setting the cruise speed" if leg is None else "flying to the start"
+
+    @property
+    def _is_barred(self) -> bool:
+        """Whether zones lie between it and the start: it is ready where it is, then."""
+        if self._barred is None:
+            session = self._session
+            self._barred = session.way_objection((self._order.position_enu_m,)) is not None
+        return self._barred
 
     @property
     def _resumes(self) -> bool:
@@ -425,6 +440,11 @@ class Preparing(Activity):
     def failure(self) -> str | None:
         """Why it will not get there; None while it may."""
         return None if self._preparation is None else self._preparation.failure
+
+    @property
+    def disturbed(self) -> bool:
+        """Whether somebody else was seen to have armed or flown it."""
+        return self._preparation is not None and self._preparation.disturbed
 
     def begin_anew(self) -> None:
         """It is another vehicle, as far as what was begun goes."""

@@ -1,24 +1,27 @@
 """The way home: set the return mode until it is seen, then wait for the landing.
 
-Return modes fly at a height of the vehicle's own, in which the layers of a fleet vanish. So a
-vehicle that has the time is first told to fly to where it started, in its own layer, and
-returns from there. Whatever goes wrong ends that part at once, as home matters more.
+Return modes fly at a height of the vehicle's own, in which the layers of a fleet vanish, and
+straight through zones. So a vehicle that has the time is first told to fly to where it started, in
+its own layer and round zones, and returns from there, or lands. Whatever goes wrong ends that part
+at once, as home matters more. Where a zone lies between it and home it lands where it is, then.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from itertools import pairwise
 
 from agent.core.interface import Return
 from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import CommandEnded, result_text
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware
-from agent.vehicle.leg import TARGET_TAG, RepositionLeg
+from agent.vehicle.leg import TARGET_TAG, reposition_leg
 from agent.vehicle.messages import Heartbeat, LandedState, Position
 from agent.vehicle.session import VehicleSession
 from swarm.protocol.fields import Point
 
-_DISARMED_LONG_S = 5.0
+DISARMED_LONG_S = 5.0
 """A vehicle disarmed for that long is down, even if it does not say that it landed."""
 
 
@@ -48,6 +51,8 @@ class Returning(Activity):
         self._mode = session.repeated("return", session.config.mode_tries)
         self._disarmed_since_s: float | None = None
         self._seen = self._told_seen = False
+        self._lands: bool | None = False if return_via is None and not session.guard else None
+        """Whether it lands where it is, rather than to return; None as long as it is not known."""
         self.failure: str | None = None
         """Why the vehicle does not return; None while it may."""
 
@@ -92,7 +97,25 @@ class Returning(Activity):
         """Return from where the vehicle is."""
         if self._return_via is not None:
             self._return_via.end()
+            self._lands = (self._return_via.arrived and self.order.land) or None
             self._return_via = None
+
+    def go_by(self, order: Return, return_via: ReturnVia) -> None:
+        """Fly home by another way, as long as it has not come to the end of the one before."""
+        if self._return_via is not None:
+            self._return_via.end()
+            self.order, self._return_via = order, return_via
+
+    def _is_barred(self) -> bool:
+        """Whether zones lie between it and where its return mode leads."""
+        session, order = self._session, self.order
+        home_enu_m = session.launched_enu_m or order.via_enu_m
+        if home_enu_m is None or not session.guard:
+            return False
+        place_enu_m = session.known_place_m()
+        if place_enu_m is None:
+            return False
+        return session.way_objection(((*home_enu_m[:2], place_enu_m[2]),)) is not None
 
     def on_position(self, position: Position) -> None:
         """See whether it is where it flies to first."""
@@ -116,11 +139,16 @@ class Returning(Activity):
             self._disarmed_since_s = session.now_s
         if not heartbeat.armed or not self.obeys(heartbeat.custom_mode):
             return
-        out = self._mode.give(self._firmware.set_return_mode(), session.now_s)
+        if self._lands is None:
+            self._lands = self._is_barred()
+        firmware = self._firmware
+        ends = firmware.set_land_mode() if self._lands else firmware.set_return_mode()
+        out = self._mode.give(ends, session.now_s)
         if out is None:
             seen = "never seen in the heartbeat"
             why = result_text(self._mode.result) if self._mode.refused else seen
-            self.failure = f"the return mode cannot be set ({why})"
+            what = "landing" if self._lands else "return"
+            self.failure = f"the {what} mode cannot be set ({why})"
         else:
             session.say(*out)
 
@@ -132,7 +160,7 @@ class Returning(Activity):
             return False
         if session.vehicle.landed in (LandedState.ON_GROUND, LandedState.UNDEFINED):
             return True
-        return since_s is not None and session.now_s - since_s >= _DISARMED_LONG_S
+        return since_s is not None and session.now_s - since_s >= DISARMED_LONG_S
 
 
 _SLOWEST_M_S = 1.0
@@ -145,15 +173,19 @@ _PATIENCE = 3.0
 
 
 class ReturnVia:
-    """Flies to one place on the way home.
+    """Flies to one place on the way home, or before it lands.
 
     Args:
-        via_enu_m: where to [m; mission origin].
+        way_enu_m: corners on the way there, then that place [m; mission origin].
         place_enu_m: where the vehicle is.
     """
 
     def __init__(
-        self, session: VehicleSession, firmware: Firmware, via_enu_m: Point, place_enu_m: Point
+        self,
+        session: VehicleSession,
+        firmware: Firmware,
+        way_enu_m: Sequence[Point],
+        place_enu_m: Point,
     ) -> None:
         speed_m_s = session.cruise_speed_m_s
         known = speed_m_s > 0.0
@@ -161,10 +193,16 @@ class ReturnVia:
         self._firmware = firmware
         self._mode = session.repeated("homeward mode", 1)
         speed = speed_m_s if known else UNCHANGED
-        self._leg = RepositionLeg(session, firmware, via_enu_m, speed, insists=False)
-        flight_s = math.dist(place_enu_m, via_enu_m) / (speed_m_s if known else _SLOWEST_M_S)
+        self._leg = reposition_leg(session, firmware, way_enu_m, speed, insists=False)
+        way_m = sum(math.dist(a, b) for a, b in pairwise((place_enu_m, *way_enu_m)))
+        flight_s = way_m / (speed_m_s if known else _SLOWEST_M_S)
         self._until_s = session.now_s + _START_S + _PATIENCE * flight_s
         self._mode_seen = self._told = self._over = False
+
+    @property
+    def arrived(self) -> bool:
+        """The vehicle is there."""
+        return self._leg.arrived
 
     @property
     def done(self) -> bool:

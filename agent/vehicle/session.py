@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Hashable
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from agent.core.interface import VehicleOrder
@@ -21,6 +21,7 @@ from agent.vehicle.parameter_override import ParameterOverride
 from agent.vehicle.signing import Signing
 from agent.vehicle.state import PositionFilter, VehicleState
 from agent.vehicle.supervision import CruiseWatch, SafetyMonitor
+from agent.vehicle.zone_guard import ZoneGuard
 from swarm.protocol.fields import Point
 from swarm.protocol.timing import earliest
 
@@ -56,6 +57,9 @@ POLL_S = 0.25
 
 _PLACES = 2
 
+_ACCELERATION_M_S2 = 2.5
+"""Of a vehicle of which the mission does not tell it: ArduCopter's own."""
+
 
 class VehicleSession(Conversation):
     """One vehicle, as far as it is heard; and what was made of it in the step under way."""
@@ -73,11 +77,30 @@ class VehicleSession(Conversation):
         """What is another parameter during a flight; None if nothing is."""
         self.cruise_speed_m_s = 0.0
         """Of the last preparation; 0 before the first."""
+        self.acceleration_m_s2 = _ACCELERATION_M_S2
+        """With which it is reckoned to brake and to speed up."""
+        self.guard = ZoneGuard(config.zones, config.zone_margin_m)
+        """Where not to fly."""
+        self.launched_enu_m: Point | None = None
+        """Where it took off on our order, to which its return mode leads; None: not known."""
         self.cruise_watch = CruiseWatch()
         self.place_enu_m = (math.nan, math.nan, math.nan)
         """Where the vehicle is, by its newest position [m; mission origin]."""
         self.sent_to_enu_m: deque[Point] = deque(maxlen=_PLACES)
         """Where the vehicle was last told to fly: of the newest it may not have heard."""
+
+    def known_place_m(self) -> Point | None:
+        """Where the vehicle is, as far as that counts and is fresh [m; mission origin]."""
+        return self.position_filter.place_m(self.now_s - self.config.stream_timeout_s)
+
+    def way_objection(self, way_enu_m: Sequence[Point]) -> str | None:
+        """Why that way must not be flown from where the vehicle is, in words; None if it may."""
+        if not self.guard:
+            return None
+        place_enu_m = self.known_place_m()
+        if place_enu_m is None:
+            return "where it is is not known, and zones are to be kept out of"
+        return self.guard.objection((place_enu_m, *way_enu_m))
 
     @property
     def silent(self) -> bool:

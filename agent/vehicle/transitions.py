@@ -17,6 +17,7 @@ from agent.core.interface import (
     Hold,
     Home,
     KeepOut,
+    Landed,
     Prepare,
     Ready,
     Refused,
@@ -24,6 +25,7 @@ from agent.core.interface import (
     ReturnAdvised,
     ReturnBegun,
     Swap,
+    Swapped,
     VehicleOrder,
     VehicleReady,
 )
@@ -32,20 +34,40 @@ from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.hand_over import HandOver, hand_over
 from agent.vehicle.holding import Holding, modes_to_leave
+from agent.vehicle.landing import Landing
 from agent.vehicle.leg import Flying
 from agent.vehicle.messages import LandedState
 from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning, ReturnVia
 from agent.vehicle.session import VehicleSession
+from agent.vehicle.standing import Departing, Standing
+from agent.vehicle.zone_guard import ZoneGuard
 
-_IN_THE_AIR = {FlightPhase.HOLDING, FlightPhase.RETURNING, FlightPhase.PREPARING}
+_IN_THE_AIR = {
+    FlightPhase.HOLDING,
+    FlightPhase.RETURNING,
+    FlightPhase.PREPARING,
+    FlightPhase.LANDING,
+}
 _LET_GO = {FlightPhase.IDLE, FlightPhase.HANDED_OVER}
 
 SUCCESSORS: Final[dict[FlightPhase, frozenset[FlightPhase]]] = {
-    FlightPhase.IDLE: frozenset({*_IN_THE_AIR, FlightPhase.HANDED_OVER}),
-    FlightPhase.PREPARING: frozenset({FlightPhase.HOVERING, *_IN_THE_AIR, *_LET_GO}),
+    FlightPhase.IDLE: frozenset({*_IN_THE_AIR, FlightPhase.STANDING, FlightPhase.HANDED_OVER}),
+    FlightPhase.PREPARING: frozenset(
+        {
+            FlightPhase.HOVERING,
+            FlightPhase.FLYING,
+            FlightPhase.STANDING,
+            *_IN_THE_AIR,
+            *_LET_GO,
+        }
+    ),
     FlightPhase.HOVERING: frozenset({FlightPhase.FLYING, *_IN_THE_AIR, *_LET_GO}),
     FlightPhase.FLYING: frozenset({FlightPhase.HOVERING, *_IN_THE_AIR, *_LET_GO}),
+    FlightPhase.LANDING: frozenset(
+        {FlightPhase.STANDING, FlightPhase.HOVERING, *_IN_THE_AIR, *_LET_GO}
+    ),
+    FlightPhase.STANDING: frozenset({FlightPhase.PREPARING, *_LET_GO}),
     FlightPhase.HOLDING: frozenset(
         {FlightPhase.HOVERING, FlightPhase.FLYING, *_IN_THE_AIR, *_LET_GO}
     ),
@@ -57,10 +79,6 @@ SUCCESSORS: Final[dict[FlightPhase, frozenset[FlightPhase]]] = {
 """What may follow which within one step: nothing is flown to that was not prepared, and a
 vehicle that was handed over is neither sent anywhere nor stopped."""
 
-
-_NO_SWAP: Final = "landing for another battery is not flown on autopilots yet"
-_NO_CORNERS: Final = "paths with corners are not flown on autopilots yet"
-_NO_LANDING: Final = "landing elsewhere than at home is not flown on autopilots yet"
 
 _UNHEARD_TIMEOUTS = 3.0
 """A vehicle that may be in the air has that many silence timeouts to be heard at all."""
@@ -115,15 +133,16 @@ def obey(activity: Activity, order: VehicleOrder, session: VehicleSession) -> Ac
             return _go_to(activity, order, session)
         case Hold():
             return _hold(activity, order, session)
-        case Return() if fault := _not_flown_yet(order):
-            session.report(Refused(order, fault))
-            return activity
         case Return():
             return _return_home(activity, order, session)
         case Swap():
-            session.report(Refused(order, _NO_SWAP))
+            return _land(activity, order, session)
+        case Ready(leg):
+            if isinstance(activity, Standing) and activity.order.leg == leg:
+                activity.let_start()
             return activity
-        case Ready() | KeepOut():
+        case KeepOut(zones, margin_m):
+            session.guard = ZoneGuard(zones, margin_m)
             return activity
 
 
@@ -138,6 +157,10 @@ def follow(activity: Activity, session: VehicleSession) -> Activity:
             return _after_hold(activity, session)
         case Returning():
             return _after_return(activity, session)
+        case Landing():
+            return _after_landing(activity, session)
+        case Standing():
+            return _after_standing(activity, session)
         case Searching() if activity.unclear is None or activity.in_vain:
             return _after_search(activity, session)
         case HandOver(taken_back=True):
@@ -167,6 +190,9 @@ def follow_mission(activity: Activity, session: VehicleSession) -> Activity:
 
 def _prepare(activity: Activity, order: Prepare, session: VehicleSession) -> Activity:
     """Prepare a vehicle for flight; one that takes no targets is stopped first."""
+    if isinstance(activity, Standing):
+        session.report(Refused(order, "it stands at its base, and is sent off from there"))
+        return activity
     if fault := _fault_of(order, session.config):
         session.report(Refused(order, fault))
         return activity
@@ -177,6 +203,7 @@ def _prepare(activity: Activity, order: Prepare, session: VehicleSession) -> Act
     session.forget_mission()
     session.safety.begin()
     session.cruise_speed_m_s = order.speed_m_s
+    session.acceleration_m_s2 = order.acceleration_m_s2 or session.acceleration_m_s2
     session.sent_to_enu_m.append(order.position_enu_m)
     session.tell_anew()
     return Preparing(session, order, ours=ours)
@@ -197,6 +224,14 @@ def _must_stop_first(activity: Activity, session: VehicleSession) -> bool:
 
 def _go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
     match activity:
+        case Standing(is_ready=True):
+            return _depart(activity, order, session)
+        case Departing():
+            if fault := _fault_of(order, session.config) or _way_fault(order, session):
+                session.report(Refused(order, fault))
+            else:
+                activity.next_order = order
+            return activity
         case Hovering() | Flying():
             takes_targets = True
         case Holding(returning=None) if session.mission is not None:
@@ -208,9 +243,11 @@ def _go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity
     if not takes_targets or session.firmware is None:
         session.report(Refused(order, f"the vehicle is {activity.phase.value}"))
         return activity
-    if fault := _fault_of(order, session.config):
+    if fault := _fault_of(order, session.config) or _way_fault(order, session):
         session.report(Refused(order, fault))
         return activity
+    if _must_stand_first(activity, order, session):
+        return _begin_holding(activity, Hold("to be sent round corners"), session, go_next=order)
     if isinstance(activity, Holding):
         session.commands.cancel_all()
     flying = Flying(session, session.firmware, order)
@@ -219,8 +256,72 @@ def _go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity
     return flying
 
 
+def _must_stand_first(activity: Activity, order: GoTo, session: VehicleSession) -> bool:
+    """Whether it must fly no mission while it is given one.
+
+    It would go on with the item of the same number, which may lie anywhere on the way round.
+    """
+    mission, heartbeat, firmware = session.mission, session.vehicle.heartbeat, session.firmware
+    if mission is None or heartbeat is None or firmware is None or isinstance(activity, Holding):
+        return False
+    in_mission = firmware.is_mission(heartbeat.custom_mode) or mission.may_be_flown
+    return in_mission and (bool(order.via_enu_m) or mission.has_corners)
+
+
+def _way_fault(order: GoTo, session: VehicleSession) -> str | None:
+    """Why the way there must not be flown, in words; None if it may be."""
+    way_enu_m = (*order.via_enu_m, order.position_enu_m)
+    faults = (session.config.out_of_bounds(corner) for corner in order.via_enu_m)
+    return next(filter(None, faults), None) or session.way_objection(way_enu_m)
+
+
+def _depart(standing: Standing, order: GoTo, session: VehicleSession) -> Activity:
+    """Take off from a base, and then fly there."""
+    fault = _fault_of(order, session.config) or _way_fault(order, session)
+    if session.cruise_speed_m_s <= 0.0:
+        fault = fault or "its cruise speed is not known"
+    if fault:
+        session.report(Refused(order, fault))
+        return standing
+    session.commands.cancel_all()
+    session.forget_mission()
+    session.safety.begin()
+    session.tell_anew()
+    return Departing(session, standing, order)
+
+
+def _land(activity: Activity, order: Swap, session: VehicleSession) -> Activity:
+    """Land a vehicle for another battery, or see that it stands."""
+    if fault := session.config.out_of_bounds(order.position_enu_m):
+        session.report(Refused(order, fault))
+        return activity
+    session.cruise_speed_m_s = order.speed_m_s or session.cruise_speed_m_s
+    match activity:
+        case HandOver():
+            session.report(Refused(order, f"the vehicle is {activity.phase.value}"))
+            return activity
+        case Standing():
+            since_s, may_start = activity.since_s, activity.may_start
+            return _stand(session, order, since_s, may_start=may_start)
+        case _:
+            ours = activity.in_our_hands
+    session.commands.cancel_all()
+    if session.mission is not None and ours:
+        session.mission.call_off()
+    return Landing(session, order, ours=ours)
+
+
+def _stand(
+    session: VehicleSession, order: Swap, since_s: float, *, may_start: bool = False
+) -> Standing:
+    session.report(Landed(order.leg))
+    return Standing(session, order, since_s, may_start=may_start)
+
+
 def _hold(activity: Activity, order: Hold, session: VehicleSession) -> Activity:
-    if isinstance(activity, HandOver):
+    if isinstance(activity, Standing):
+        session.report(Held())
+    elif isinstance(activity, HandOver):
         session.report(Refused(order, f"the vehicle is {activity.phase.value}"))
     elif not activity.in_our_hands:
         # It may fly on the orders of an earlier life, or be somebody else's.
@@ -245,7 +346,11 @@ def _return_under_way(activity: Activity) -> Returning | None:
 
 
 def _begin_holding(
-    activity: Activity, order: Hold, session: VehicleSession, prepare_next: Prepare | None = None
+    activity: Activity,
+    order: Hold,
+    session: VehicleSession,
+    prepare_next: Prepare | None = None,
+    go_next: GoTo | None = None,
 ) -> Activity:
     """Stop a vehicle that flies on our orders, or is about to."""
     firmware, heartbeat, mission = session.firmware, session.vehicle.heartbeat, session.mission
@@ -271,17 +376,26 @@ def _begin_holding(
         motors_asked=preparing and activity.in_our_hands,
         returning=returning,
         prepare_next=prepare_next,
+        go_next=go_next,
     )
 
 
 def _return_home(activity: Activity, order: Return, session: VehicleSession) -> Activity:
     """Bring a vehicle home, unless it is down, somebody else's, or not known well enough."""
+    firmware, heartbeat, mission = session.firmware, session.vehicle.heartbeat, session.mission
     if isinstance(activity, Returning):
+        in_field = order.path_enu_m or order.land or session.guard
         if order.via_enu_m is None:
             activity.go_straight()
+        elif in_field and firmware is not None:
+            via = _return_via(order, firmware, session)
+            if via is not None:
+                activity.go_by(order, via)
         return activity
     session.commands.cancel_all()
-    firmware, heartbeat, mission = session.firmware, session.vehicle.heartbeat, session.mission
+    if isinstance(activity, Standing):
+        session.report(Home())
+        return Idle(session)
     if firmware is None or heartbeat is None:
         if order.resume:
             return Searching(session, order)
@@ -290,7 +404,8 @@ def _return_home(activity: Activity, order: Return, session: VehicleSession) -> 
     if session.flies_unknown_mission():
         return Searching(session, order)
     mode = heartbeat.custom_mode
-    took_off = activity.took_off or isinstance(activity, Hovering | Flying | Holding)
+    flew = isinstance(activity, Hovering | Flying | Holding | Landing)
+    took_off = activity.took_off or flew
     taking_off = firmware.is_taking_off(mode) and (took_off or order.resume)
     on_mission = mission is not None and (
         session.flies_for_us(mode)
@@ -328,7 +443,10 @@ def _return_via(order: Return, firmware: Firmware, session: VehicleSession) -> R
     obeys = firmware.is_commanded(mode) or firmware.is_mission(mode)
     if not (obeys and firmware.airborne(session.vehicle)) or config.out_of_bounds(via_enu_m):
         return None
-    return ReturnVia(session, firmware, via_enu_m, place_enu_m)
+    way_enu_m = (*order.path_enu_m, via_enu_m)
+    if any(map(config.out_of_bounds, order.path_enu_m)) or session.way_objection(way_enu_m):
+        return None
+    return ReturnVia(session, firmware, way_enu_m, place_enu_m)
 
 
 def _refuse_return(order: Return, reason: str, session: VehicleSession) -> Activity:
@@ -346,17 +464,8 @@ def _fault_of(order: Prepare | GoTo, config: BridgeConfig) -> str | None:
             return f"speed {speed_m_s} m/s is not > 0"
         case GoTo(stay_s=stay_s) if not (math.isfinite(stay_s) and stay_s >= 0.0):
             return f"a stay of {stay_s} s is not >= 0"
-        case GoTo():
-            return _not_flown_yet(order)
         case _:
             return None
-
-
-def _not_flown_yet(order: GoTo | Return) -> str | None:
-    """What of the order the bridge has no activity for, in words; None if it has one for all."""
-    if order.via_enu_m if isinstance(order, GoTo) else order.path_enu_m:
-        return _NO_CORNERS
-    return _NO_LANDING if isinstance(order, Return) and order.land else None
 
 
 # By the end of the activity before.
@@ -396,6 +505,8 @@ def _after_preparation(preparing: Preparing, session: VehicleSession) -> Activit
     if failure is None:
         if mission is not None:
             mission.wait_there()
+        if isinstance(preparing, Departing):
+            return _go_to(Hovering(session), preparing.next_order, session)
         session.report(VehicleReady())
         return Hovering(session)
     flies = session.vehicle.armed and firmware is not None and firmware.airborne(session.vehicle)
@@ -404,6 +515,9 @@ def _after_preparation(preparing: Preparing, session: VehicleSession) -> Activit
         return Hovering(session)
     if mission is not None:
         mission.stand_down()  # an upload is still ended, never left half
+    if isinstance(preparing, Departing):
+        session.report(Refused(preparing.next_order, failure))
+        return preparing.standing.again(disturbed=preparing.disturbed)
     session.report(Refused(preparing.order, failure))
     return Idle(session)
 
@@ -422,13 +536,14 @@ def _after_leg(flying: Flying, session: VehicleSession) -> Activity:
 
 def _after_hold(holding: Holding, session: VehicleSession) -> Activity:
     mission, returning, prepare = session.mission, holding.returning, holding.prepare_next
+    go_next = holding.go_next
     session.commands.cancel_all()
     after = Hovering(session) if holding.aloft else Idle(session)
     if holding.failure is not None:
         if mission is not None and returning is None:
             mission.carry_on()
         failure = session.in_its_words(holding.failure)
-        session.report(Refused(holding.order, failure))
+        session.report(Refused(go_next or holding.order, failure))
         if prepare is not None:
             session.report(Refused(prepare, failure))
         if returning is None:
@@ -439,9 +554,32 @@ def _after_hold(holding: Holding, session: VehicleSession) -> Activity:
         mission.stand_down()
     if prepare is not None:
         return _prepare(after, prepare, session)
+    if go_next is not None and holding.aloft:
+        return _go_to(after, go_next, session)
     # It may have landed before it could be stopped.
     session.report(Home() if returning is not None and not holding.aloft else Held())
     return after
+
+
+def _after_landing(landing: Landing, session: VehicleSession) -> Activity:
+    if landing.taken is not None:
+        return hand_over(session, landing.taken)
+    if landing.is_down:
+        session.commands.cancel_all()
+        return _stand(session, landing.order, session.now_s)
+    if landing.failure is not None:
+        session.commands.cancel_all()
+        session.report(Refused(landing.order, session.in_its_words(landing.failure)))
+        return Hovering(session)
+    return landing
+
+
+def _after_standing(standing: Standing, session: VehicleSession) -> Activity:
+    if standing.taken is not None:
+        return hand_over(session, standing.taken)
+    if standing.has_news():
+        session.report(Swapped(standing.order.leg))
+    return standing
 
 
 def _after_return(returning: Returning, session: VehicleSession) -> Activity:

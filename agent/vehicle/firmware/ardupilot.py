@@ -82,6 +82,7 @@ class ArduCopter(Firmware):
     mission_mode = _AUTO
     """Refused on the ground unless the mission begins with a takeoff."""
     return_mode = _RTL
+    land_mode = _LAND
     returning_modes = frozenset({_RTL, _LAND, _SMART_RTL, _AUTO_RTL})
     speed_parameters = (SpeedParameter("WP_SPD", 1.0), SpeedParameter("WPNAV_SPEED", 100.0))
     """WP_SPD [m/s] since 4.8, WPNAV_SPEED [cm/s] before."""

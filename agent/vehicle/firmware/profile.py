@@ -71,6 +71,8 @@ class Firmware(ABC):
     """In which the vehicle flies the mission that stands on it."""
     return_mode: ClassVar[Mode]
     """In which it climbs, returns, lands and disarms."""
+    land_mode: ClassVar[Mode]
+    """In which it lands where it is, and disarms."""
     returning_modes: ClassVar[frozenset[Mode]]
     """In which it returns or lands by itself."""
     speed_parameters: ClassVar[tuple[SpeedParameter, ...]]
@@ -118,6 +120,10 @@ class Firmware(ABC):
     def is_returning(self, custom_mode: int) -> bool:
         """Whether the vehicle returns or lands by itself in that mode."""
         return self.mode(custom_mode) in self.returning_modes
+
+    def is_landing(self, custom_mode: int) -> bool:
+        """Whether the vehicle lands where it is in that mode."""
+        return self.mode(custom_mode) == self.land_mode
 
     def has_booted(self, heartbeat: Heartbeat) -> bool:
         """Whether the autopilot is past booting and calibrating."""
@@ -178,6 +184,10 @@ class Firmware(ABC):
     def set_return_mode(self) -> CommandLong:
         """Return to launch and land."""
         return _set_mode(*self.return_mode)
+
+    def set_land_mode(self) -> CommandLong:
+        """Land where it is."""
+        return _set_mode(*self.land_mode)
 
     def arm(self) -> CommandLong:
         """Start the motors, with all checks."""

@@ -82,6 +82,7 @@ class Px4Copter(Firmware):
     mission_mode = _MISSION
     """Acknowledged even if there is no mission to fly."""
     return_mode = _RTL
+    land_mode = _LAND
     returning_modes = frozenset({_RTL, _LAND, _PRECLAND})
     speed_parameters = (SpeedParameter("MPC_XY_CRUISE", 1.0),)
     """[m/s]; it also survives a restart of the vehicle."""

@@ -1,0 +1,104 @@
+"""Keeps one vehicle out of zones: no way through one is ever commanded.
+
+The last look before anything is said, by what the vehicle itself tells of its place; which way
+leads round is the agent's to say. Who is inside already may leave, on a short way. A vehicle
+hovers and flies a little beside its path, which planned paths allow for and this does not mind.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+import numpy.typing as npt
+
+from swarm.allocation.legs.obstacles import Obstacles
+from swarm.model import Zone
+from swarm.protocol.fields import Point
+
+FloatArray = npt.NDArray[np.float64]
+
+_ASIDE_M = 1.0
+"""So much nearer than the margin a way may come: nothing hovers quite where it was told."""
+
+_STEP_M = 0.5
+"""Places are looked at that far apart on a way out."""
+
+_MORE_M, _MORE = 5.0, 1.5
+"""A way out may be so many times as long as the shortest, and that much longer."""
+
+
+class ZoneGuard:
+    """The zones that one vehicle has to heed.
+
+    Args:
+        zones: whatever their heights.
+        margin_m: distance to keep from them [m].
+    """
+
+    def __init__(self, zones: Sequence[Zone] = (), margin_m: float = 0.0) -> None:
+        near_m = max(0.0, margin_m - _ASIDE_M)
+        self._zones = [(zone, Obstacles([zone], near_m)) for zone in zones]
+
+    def __bool__(self) -> bool:
+        return bool(self._zones)
+
+    def objection(self, path_enu_m: Sequence[Point]) -> str | None:
+        """Why a vehicle must not fly that path, in words; None if it may.
+
+        Args:
+            path_enu_m: from where it is, corner by corner, to where it stops [m].
+        """
+        for number, (here, there) in enumerate(pairwise(path_enu_m)):
+            for zone, obstacles in self._zones:
+                if not zone.concerns(*sorted((here[2], there[2]))):
+                    continue
+                if _clear(obstacles, here, there):
+                    continue
+                if number or not _leaves(obstacles, here, there):
+                    return f"zone {zone.id} lies in the way"
+        return None
+
+    def clear(self, path_enu_m: Sequence[Point]) -> bool:
+        """Whether no piece of that path meets a zone."""
+        if not self._zones:
+            return True
+        places_m = np.array([place[:2] for place in path_enu_m])
+        heights_m = [place[2] for place in path_enu_m]
+        low_m, high_m = min(heights_m), max(heights_m)
+        return all(
+            bool(obstacles.clear(places_m[:-1], places_m[1:]).all())
+            for zone, obstacles in self._zones
+            if zone.concerns(low_m, high_m)
+        )
+
+    def inside(self, place_enu_m: Point) -> bool:
+        """Whether that place lies in a zone."""
+        place_m, up_m = np.array([place_enu_m[:2]]), place_enu_m[2]
+        return any(
+            zone.concerns(up_m, up_m) and not obstacles.free(place_m)[0]
+            for zone, obstacles in self._zones
+        )
+
+
+def _clear(obstacles: Obstacles, here: Point, there: Point) -> bool:
+    return bool(obstacles.clear(np.array([here[:2]]), np.array([there[:2]]))[0])
+
+
+def _leaves(obstacles: Obstacles, here: Point, there: Point) -> bool:
+    """Whether a straight piece leads out of what it begins in, soon and for good."""
+    here_m, there_m = np.array([here[:2]]), np.array([there[:2]])
+    if obstacles.free(here_m)[0]:
+        return False
+    length_m = math.dist(here[:2], there[:2])
+    share = np.linspace(0.0, 1.0, 2 + math.ceil(length_m / _STEP_M))[:, None]
+    places_m: FloatArray = here_m + share * (there_m - here_m)
+    outside = np.flatnonzero(obstacles.free(places_m))
+    if not len(outside):
+        return False
+    first_m = places_m[outside[:1]]
+    out_m = math.dist(obstacles.way_out_m(here_m[0]), here[:2])
+    short = math.dist(first_m[0], here[:2]) <= _MORE * out_m + _MORE_M
+    return short and bool(obstacles.clear(first_m, there_m)[0])
