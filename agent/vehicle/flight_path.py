@@ -3,7 +3,8 @@
 A vehicle that is told another place in flight brakes along its old way while it gathers speed on
 the new one, both with its acceleration: so it bends round the corner on a parabola. The nearer to
 the corner it is told, the slower it has become and the less it cuts. It is told as early as
-corners are cut by no more than is allowed, and no zone is touched by what it flies until then.
+corners are cut by no more than is allowed, and no zone is touched by that bend, nor by the
+straight way that a vehicle without inertia would take.
 """
 
 from __future__ import annotations
@@ -75,7 +76,10 @@ class FlightPath:
         bend = self._bend(place, velocity, self._points[first], self._points[self._aim + 1])
         skipped = self._points[first : self._aim + 1]
         cut_m = max(_distance_m(corner, bend) for corner in skipped)
-        return cut_m <= self._corner_m and self._guard.clear(bend)
+        if cut_m > self._corner_m:
+            return False
+        # Whatever else is flown lies between the bend and the straight way.
+        return self._guard.clear((place, bend[-1])) and self._guard.clear(bend)
 
     def _bend(self, place: Point, velocity: Point, corner: Point, there: Point) -> list[Point]:
         """What is flown if the vehicle is told to go ``there`` now, on its way to ``corner``."""

@@ -84,6 +84,8 @@ class FakeCopter:
         self.silent = False
         self.fastest_m_s = math.inf
         """What its limits of tilt and thrust allow, whatever speed it acknowledges."""
+        self.stays_armed = False
+        """Does not disarm by itself once it has landed."""
         self.stuck = False
         """Acknowledges targets and does not move."""
         self.fence_radius_m = math.inf
@@ -134,6 +136,8 @@ class FakeCopter:
         self.armed_at_s = 0.0
         self.airborne = self.position_m[2] > self.ground_m + 0.1
         self.target_m: Point | None = None
+        self.lands = False
+        """Comes down where it is, as it was told."""
         self.velocity_m_s: Point = (0.0, 0.0, 0.0)
         self.speed_m_s = self.default_speed_m_s
         self.in_takeoff = False
@@ -297,12 +301,17 @@ class FakeCopter:
             self.text(2, why)
             return FAILED
         self.set_mode(mode)
+        if mode == self.land_mode:
+            self.lands = True
+            self.target_m = (*self.position_m[:2], self.ground_m) if self.airborne else None
+            self.armed &= self.airborne
         return ACCEPTED
 
     def set_mode(self, mode: int) -> None:
         """By command, by the pilot's switch or by a failsafe."""
         self.mode = mode
         self.target_m = None
+        self.lands = False
         self.in_takeoff = False
         self.mission.leave()
         if mode == self.return_mode:
@@ -365,6 +374,8 @@ class FakeCopter:
         self.velocity_m_s = (0.0, 0.0, 0.0) if still else (moved[0], moved[1], moved[2])
         if still and (self.mode == self.return_mode or self.mission.going_home):
             self._next_of_return()
+        elif still and self.lands:
+            self._land()
 
     def _next_of_return(self) -> None:
         east, north, _ = self.home_m
@@ -377,7 +388,8 @@ class FakeCopter:
 
     def _land(self) -> None:
         self.mission.going_home = False
-        self.airborne = self.armed = False
+        self.airborne = self.lands = False
+        self.armed = self.stays_armed
         self.target_m = None
 
     def _flush(self) -> list[bytes]:

@@ -1,0 +1,260 @@
+"""A vehicle lands at a base for another battery, and starts again only when it may."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from agent.core.interface import (
+    Arrived,
+    GoTo,
+    HandedOver,
+    Held,
+    Hold,
+    Home,
+    Landed,
+    Prepare,
+    Ready,
+    Refused,
+    Return,
+    ReturnAdvised,
+    Swap,
+    Swapped,
+)
+from agent.vehicle.activity import FlightPhase
+from agent.vehicle.config import BridgeConfig, CommandStyle
+from tests.support.bridge_flight import ORIGIN, BridgeFlight
+from tests.support.fake_copter import ARM, SET_MODE, TAKEOFF, FakeCopter
+from tests.support.fake_px4 import FakePx4
+
+BASE = (5.0, 0.0, 0.0)
+ABOVE = (5.0, 0.0, 10.0)
+SWAP = Swap(3, BASE, 20.0, 4.0)
+STYLES = [CommandStyle.REPOSITION, CommandStyle.MISSION]
+
+
+@pytest.fixture(params=[FakeCopter, FakePx4], ids=["arducopter", "px4"])
+def fake(request: pytest.FixtureRequest) -> type[FakeCopter]:
+    kind: type[FakeCopter] = request.param
+    return kind
+
+
+@pytest.fixture(params=STYLES, ids=[style.value for style in STYLES])
+def config(request: pytest.FixtureRequest) -> BridgeConfig:
+    return BridgeConfig(1, ORIGIN, command=request.param)
+
+
+def landed(fake: type[FakeCopter], config: BridgeConfig, percent: int = 30) -> BridgeFlight:
+    """A flight that has just touched down at the base, its battery used up."""
+    flight = BridgeFlight(fake(ORIGIN), config).prepared()
+    flight.copter.battery_percent = percent
+    flight.order(SWAP)
+    flight.run_until(Landed(3))
+    flight.copter.heard.clear()
+    return flight
+
+
+def changed(flight: BridgeFlight, silent_s: float = 8.0) -> None:
+    """A person changes the battery, which switches the autopilot off and on."""
+    flight.copter.silent = True
+    flight.run(silent_s)
+    flight.copter.power_on(flight.now_s)
+    flight.copter.silent, flight.copter.battery_percent = False, 99
+    flight.run(12.0)
+
+
+def test_it_lands_waits_for_word_and_battery_and_flies_on(
+    fake: type[FakeCopter], config: BridgeConfig
+) -> None:
+    flight = landed(fake, config)
+    assert not flight.copter.armed
+    assert flight.bridge.phase is FlightPhase.STANDING
+
+    changed(flight)
+    assert Swapped(3) not in flight.reports, "nobody has let it start"
+    assert not flight.copter.count()[ARM]
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3), limit_s=5.0)
+    assert not flight.copter.count()[ARM], "it was not sent anywhere"
+
+    flight.order(GoTo(4, (40.0, 0.0, 12.0)))
+    flight.run_until(Arrived(4), limit_s=120.0)
+    assert flight.copter.count()[TAKEOFF] == 1
+    assert flight.bridge.phase is FlightPhase.HOVERING
+    assert not [each for each in flight.reports if isinstance(each, HandedOver)]
+
+
+def test_the_word_alone_does_not_start_it_on_an_empty_battery(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN))
+
+    flight.order(Ready(3))
+    flight.run(30.0)
+
+    assert Swapped(3) not in flight.reports
+    assert "battery at 30%, below the 90% of a full one" in flight.reasons()
+    assert isinstance(flight.order(GoTo(4, ABOVE))[-1], Refused)
+    assert flight.bridge.phase is FlightPhase.STANDING
+
+
+def test_the_word_about_another_landing_counts_for_nothing(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN), percent=99)
+
+    flight.order(Ready(2))
+    flight.run(30.0)
+
+    assert Swapped(3) not in flight.reports
+
+
+def test_a_simulated_one_is_ready_once_a_swap_takes_no_longer(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN, ready_by_itself=True), percent=95)
+    down_s = flight.now_s
+
+    flight.run_until(Swapped(3))
+
+    assert flight.now_s - down_s == pytest.approx(SWAP.swap_s, abs=0.5)
+
+
+@pytest.mark.parametrize("order", [Prepare(ABOVE, 4.0), GoTo(4, ABOVE)], ids=["prepare", "go to"])
+def test_nothing_else_starts_it(fake: type[FakeCopter], order: Prepare | GoTo) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN), percent=99)
+
+    assert isinstance(flight.order(order)[-1], Refused)
+    flight.run(30.0)
+
+    assert not flight.copter.count()[ARM]
+    assert flight.bridge.phase is FlightPhase.STANDING
+
+
+def test_one_that_somebody_armed_needs_another_word(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN), percent=30)
+    flight.order(Ready(3))
+    flight.copter.armed, flight.copter.armed_at_s = True, flight.now_s
+    flight.run(5.0)
+    flight.copter.armed, flight.copter.battery_percent = False, 99
+    flight.run(30.0)
+
+    assert Swapped(3) not in flight.reports
+
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3))
+
+
+def test_one_that_its_pilot_flies_away_is_his(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN))
+    copter = flight.copter
+    copter.mode, copter.armed, copter.airborne = copter.pilot_mode, True, True
+
+    flight.run_until(HandedOver)
+
+
+def test_one_that_does_not_disarm_is_told_to(fake: type[FakeCopter]) -> None:
+    flight = BridgeFlight(fake(ORIGIN), BridgeConfig(1, ORIGIN)).prepared()
+    flight.copter.stays_armed = True
+    flight.copter.armed_at_s = flight.now_s + 1e3
+
+    flight.order(SWAP)
+    flight.run_until(Landed(3), limit_s=60.0)
+
+    assert [each.param1 for each in flight.copter.commands(ARM)][-1] == 0.0
+
+
+def test_it_flies_above_the_place_first(fake: type[FakeCopter], config: BridgeConfig) -> None:
+    flight = BridgeFlight(fake(ORIGIN), config).prepared()
+
+    flight.order(replace(SWAP, position_enu_m=(30.0, 5.0, 0.0)))
+    flight.run_until(Landed(3), limit_s=90.0)
+
+    assert flight.copter.position_m == pytest.approx((30.0, 5.0, 0.0), abs=1.5)
+
+
+@pytest.mark.parametrize("after_s", [0.2, 2.0, 30.0], ids=["at once", "coming down", "standing"])
+def test_an_agent_killed_while_it_lands_finds_it_as_it_is(
+    fake: type[FakeCopter], config: BridgeConfig, after_s: float
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN), config).prepared()
+    flight.copter.battery_percent = 99
+    flight.order(SWAP)
+    flight.run(after_s)
+
+    flight.restart()
+    flight.order(SWAP)
+    flight.run_until(Landed(3))
+    assert flight.bridge.phase is FlightPhase.STANDING
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3))
+    flight.order(GoTo(4, (20.0, 0.0, 10.0)))
+    flight.run_until(Arrived(4))
+
+
+def test_an_agent_killed_while_it_climbs_from_its_base_takes_it_in_hand(
+    fake: type[FakeCopter],
+) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN), percent=99)
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3))
+    flight.order(GoTo(4, (20.0, 0.0, 10.0)))
+    for _ in range(2000):
+        if flight.copter.airborne:
+            break
+        flight.step()
+
+    flight.restart(down_s=0.5)
+    flight.order(Prepare(ABOVE, 4.0, resume=True, left_in_air=True))
+    flight.run(30.0)
+
+    assert flight.bridge.phase is FlightPhase.HOVERING
+
+
+def test_a_hold_stops_its_landing_in_the_air(fake: type[FakeCopter], config: BridgeConfig) -> None:
+    flight = BridgeFlight(fake(ORIGIN), config).prepared()
+    flight.order(SWAP)
+    flight.run(1.5)
+
+    flight.order(Hold("wait"))
+    flight.run(20.0)
+
+    assert flight.copter.airborne
+    assert flight.seen == [Held()]
+    flight.order(replace(SWAP, leg=4))
+    flight.run_until(Landed(4))
+
+
+def test_who_stands_there_is_held_and_home_without_a_word(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN))
+
+    assert flight.order(Hold("wait")) == [Held()]
+    assert flight.order(Return("over")) == [Home()]
+    assert not flight.copter.count()[SET_MODE]
+
+
+def test_a_take_off_that_fails_leaves_it_standing_and_ready(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN, arm_tries=2), percent=99)
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3))
+    flight.copter.verdicts[ARM] = [4, 4]
+    go = GoTo(4, (20.0, 0.0, 10.0))
+    flight.order(go)
+    refused = flight.run_until(Refused)
+
+    assert isinstance(refused, Refused)
+    assert refused.order == go
+    assert flight.order(replace(SWAP, leg=5))[0] == Landed(5)
+    flight.run_until(Swapped(5))
+
+
+def test_a_reboot_before_it_is_armed_takes_the_word_back(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN), percent=99)
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3))
+    flight.copter.prearm_ok = False
+    flight.run(2.0)
+    flight.order(GoTo(4, (20.0, 0.0, 10.0)))
+    flight.run(3.0)
+    changed(flight, silent_s=1.0)
+    flight.copter.prearm_ok = True
+    flight.run(30.0)
+
+    assert flight.bridge.phase is FlightPhase.STANDING
+    assert not flight.copter.armed
+    assert not [each for each in flight.reports if isinstance(each, ReturnAdvised)]
