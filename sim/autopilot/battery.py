@@ -1,4 +1,4 @@
-"""The battery of a vehicle: a charge that armed time drains, and what is measured of it.
+"""The battery of a vehicle: a charge that is drained while motors run, and what is measured of it.
 
 The current is the same as long as the motors run, so charge, current, consumption and remaining
 share agree with each other at every instant; the voltage falls in proportion to the charge. Left
@@ -27,13 +27,18 @@ class ChargeLevel(IntEnum):
 
 
 class BatteryModel:
-    """One battery, full at first.
+    """One battery.
 
-    Without an ``endurance_s`` of armed time [s] it stays full; without a ``failsafe`` the firmware
-    never acts.
+    Without an ``endurance_s`` [s], of armed time or time in flight, it stays as it is; without a
+    ``failsafe`` the firmware never acts.
     """
 
-    def __init__(self, endurance_s: float | None, failsafe: BatteryFailsafe | None) -> None:
+    def __init__(
+        self,
+        endurance_s: float | None,
+        failsafe: BatteryFailsafe | None,
+        charge_frac: float = 1.0,
+    ) -> None:
         self._endurance_s = endurance_s
         self._steps: tuple[tuple[float, ChargeLevel], ...] = ()
         if failsafe is not None:
@@ -41,7 +46,7 @@ class BatteryModel:
             self._steps = (low, ChargeLevel.LOW), (critical, ChargeLevel.CRITICAL)
         self.level = ChargeLevel.FINE
         """How worried the firmware is."""
-        self._charge_frac = 1.0
+        self._charge_frac = charge_frac
         """Charge at the instant from which the motors run, or now while they stand."""
         self._running_since_s: float | None = None
 
@@ -54,6 +59,11 @@ class BatteryModel:
         """The motors stand from now on."""
         self._charge_frac = self.remaining_frac(now_s)
         self._running_since_s = None
+
+    def fill(self) -> None:
+        """Be another battery, a full one, in a vehicle whose motors stand."""
+        self._charge_frac = 1.0
+        self.level = ChargeLevel.FINE
 
     def drop_to(self, charge_frac: float, now_s: float) -> None:
         """Lose charge at once; one that is lower already stays."""

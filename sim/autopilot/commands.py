@@ -101,6 +101,7 @@ class CommandExecutor:
             case mavlink.MAV_CMD_NAV_TAKEOFF:
                 return self._take_off(command, now_s)
             case mavlink.MAV_CMD_NAV_LAND:
+                pilot.narrator.tell(FirmwareEvent.LANDING_ORDERED)
                 return self._result(pilot.set_mode(FlightMode.LAND, now_s))
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
                 pilot.narrator.tell(FirmwareEvent.RETURN_ORDERED)

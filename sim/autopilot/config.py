@@ -18,6 +18,10 @@ from swarm.model.frames import DEFAULT_ORIGIN, Origin
 
 _AIRSPEED_PER_CRUISE = 1.5
 _MAX_SYSTEM_ID = 254
+_LAND_NEAR_GROUND_M_S = 0.5
+_DESCENT_M_S = 1.5
+"""How real ones land, ArduCopter by its defaults. Where nobody lands before the end of the mission,
+landings are quick."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +106,11 @@ class VehicleConfig:
     """Take-off speed [m/s]."""
     land_m_s: float = 1.5
     """Landing speed [m/s]."""
+    descent_m_s: float | None = None
+    """Speed at which a landing comes down to 10 m above the ground [m/s]; None: the same."""
+    grounds_enu_m: tuple[Point, ...] = ()
+    """Places where the height of the ground is known [m], which it has around them; none: that of
+    the start everywhere."""
     delays: Delays = Delays()
     spool_up_s: float = 1.0
     """From an accepted take-off to leaving the ground [s]; 3 to 4 on ArduCopter."""
@@ -138,6 +147,7 @@ class VehicleConfig:
             "cruise_m_s",
             "climb_m_s",
             "land_m_s",
+            "descent_m_s",
             "endurance_s",
             "position_failsafe_s",
             "acceleration_m_s2",
@@ -239,6 +249,9 @@ def fleet_of(
     """
     physics = physics or Physics()
     given_m_s2, given_s = physics.acceleration_m_s2, physics.endurance_s
+    landings: dict[str, float] = {}
+    if mission.bases:
+        landings = {"land_m_s": _LAND_NEAR_GROUND_M_S, "descent_m_s": _DESCENT_M_S}
     bases = tuple(ServedBase(base.position_enu_m, base.swap_s) for base in mission.bases)
     places = {uav.id: place for place, uav in enumerate(mission.uavs)}
     members = []
@@ -256,12 +269,14 @@ def fleet_of(
             endurance_s=uav.endurance_s if given_s is None else given_s,
             charge_frac=uav.charge_frac if given_s is None else 1.0,
             drains_in_flight=given_s is None and uav.endurance_s is not None,
+            grounds_enu_m=(uav.position_enu_m, *(base.position_enu_m for base in bases)),
             bases=bases,
             swap_reboots=physics.swap_reboots,
             battery_failsafe=physics.battery_failsafe,
             position_failsafe_s=physics.position_failsafe_s,
             acceleration_m_s2=uav.acceleration_m_s2 if given_m_s2 is None else given_m_s2,
             airspeed_limit_m_s=uav.airspeed_m_s,
+            **landings,
             wind=physics.wind(mission, place),
         )
         members.append(FleetMember(uav.id, config))

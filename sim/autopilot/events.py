@@ -161,6 +161,8 @@ class FirmwareEvent(Enum):
     MISSION_OVER = auto()
     """In the air."""
     MISSION_OVER_ON_GROUND = auto()
+    LANDING_ORDERED = auto()
+    """By the command for it."""
     RETURN_ORDERED = auto()
     """By a command, from the ground or in a mission."""
     RETURN_BEGUN = auto()

@@ -67,6 +67,10 @@ class FailsafeMonitor:
         # PX4's health report goes by its failsafes; ArduCopter checks other things on the ground.
         return ("Failsafe",) if self._causes and self._behaviour.words else ()
 
+    def battery_changed(self) -> None:
+        """The vehicle, standing, has got another battery."""
+        self._causes.discard(_Cause.BATTERY)
+
     def disarmed(self) -> None:
         """The motors stand."""
         self._held = None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from enum import Enum
 
 from sim.autopilot.config import VehicleConfig
@@ -40,6 +41,9 @@ _FALL_M_S = 10.0
 
 _LEAST_SPEED_M_S = 0.01
 
+_NEAR_GROUND_M = 10.0
+"""From here down a landing is slow [m]: ArduCopter's LAND_ALT_LOW, PX4's MPC_LAND_ALT1."""
+
 
 class MotionPhase(Enum):
     """What the vehicle is doing."""
@@ -74,8 +78,8 @@ class FlightStateMachine:
         self.home_enu_m: Point = config.start_enu_m
         """Where the vehicle returns to and heights are counted from [m]."""
         self.motion = motion
-        self._ground_up_m = config.start_enu_m[2]
-        """Height of the flat ground everywhere [m]."""
+        self._grounds_enu_m = config.grounds_enu_m or (config.start_enu_m,)
+        self._descent_m_s = config.descent_m_s
         self._spool_up_s = config.spool_up_s
         self._touchdown_s = config.touchdown_s
         self._take_off_up_m = 0.0
@@ -85,6 +89,13 @@ class FlightStateMachine:
         self._order: tuple[Point, float] = (config.start_enu_m, _LEAST_SPEED_M_S)
         """Place [m] and speed [m/s] of the last leg."""
         self._hindered: frozenset[MotionPhase] = frozenset()
+        self._is_high = False
+        """It lands, and is as yet far from the ground."""
+
+    def ground_up_m(self, east_m: float, north_m: float) -> float:
+        """Height of the ground at a place [m]: that of the nearest place of known height."""
+        here = east_m, north_m
+        return min(self._grounds_enu_m, key=lambda ground: math.dist(ground[:2], here))[2]
 
     @property
     def on_ground(self) -> bool:
@@ -146,7 +157,7 @@ class FlightStateMachine:
         if self.on_ground:
             self.hold(now_s)
         elif self.activity is not MotionPhase.TOUCHED_DOWN:
-            self._descend(MotionPhase.LANDING, self._speed(ParameterRole.LAND_M_S), now_s)
+            self._land(now_s)
 
     def fall(self, now_s: float) -> None:
         """Drop, because the motors stand still."""
@@ -195,6 +206,8 @@ class FlightStateMachine:
                 )
             case MotionPhase.WAITING:
                 self.land(at_s)
+            case MotionPhase.LANDING if self._is_high:
+                self._land(at_s)
             case MotionPhase.LANDING:
                 self.motion.stop(at_s)
                 self.activity = MotionPhase.TOUCHED_DOWN
@@ -217,9 +230,21 @@ class FlightStateMachine:
     def _speed(self, setting: ParameterRole) -> float:
         return max(_LEAST_SPEED_M_S, self._parameters.value_si(setting))
 
+    def _land(self, now_s: float) -> None:
+        """Descend, far from the ground perhaps faster than near it."""
+        east_m, north_m, up_m = self._stopped_enu_m(now_s)
+        low_up_m = self.ground_up_m(east_m, north_m) + _NEAR_GROUND_M
+        self._is_high = self._descent_m_s is not None and up_m > low_up_m
+        if self._descent_m_s is not None and self._is_high:
+            target_enu_m = east_m, north_m, low_up_m
+            self._leave(MotionPhase.LANDING, target_enu_m, self._descent_m_s, now_s)
+        else:
+            self._descend(MotionPhase.LANDING, self._speed(ParameterRole.LAND_M_S), now_s)
+
     def _descend(self, activity: MotionPhase, speed_m_s: float, now_s: float) -> None:
         east_m, north_m, _ = self._stopped_enu_m(now_s)
-        self._leave(activity, (east_m, north_m, self._ground_up_m), speed_m_s, now_s)
+        target_enu_m = east_m, north_m, self.ground_up_m(east_m, north_m)
+        self._leave(activity, target_enu_m, speed_m_s, now_s)
 
     def _leave(
         self, activity: MotionPhase, target_enu_m: Point, speed_m_s: float, now_s: float

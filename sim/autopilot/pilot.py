@@ -59,6 +59,10 @@ class Pilot:
         self.run = MissionRun(self)
         self.mode = flavour.modes.at_boot
         self.armed = False
+        self.stands_since_s: float | None = None
+        """When the motors stopped after a flight [s]; None while they run, before the first flight
+        and with a battery that was changed since."""
+        self._flew = False
         self.task_done = False
         """What the last take-off, mission or landing was for is done."""
         self._mode_changed = mode_changed
@@ -141,10 +145,14 @@ class Pilot:
         stood, landing = self.flight.on_ground, self.flight.activity is MotionPhase.LANDING
         milestone = self.flight.advance(at_s)
         if stood and not self.flight.on_ground:
+            self._flew = True
+            self.battery.start(at_s)
             self.narrator.tell(FirmwareEvent.LIFTED_OFF)
         lands = self.flight.activity is MotionPhase.LANDING and not landing
         if lands and self.mode is FlightMode.RTL:
             self.narrator.tell(FirmwareEvent.RETURN_LANDING)
+        if self.config.drains_in_flight and self.flight.on_ground:
+            self.battery.stop(at_s)
         if milestone is Milestone.LANDED:
             self._landed(at_s)
         elif milestone is Milestone.TAKEN_OFF and self.mode is self.flavour.modes.for_take_off:
@@ -282,13 +290,14 @@ class Pilot:
         if obstacles:
             return False
         self.armed = True
-        self.battery.start(now_s)
+        self.stands_since_s = None
+        if not self.config.drains_in_flight:
+            self.battery.start(now_s)
         self._disarm_unused(now_s)
         if self.flavour.tells_origin_when_armed:
             self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(now_s)))
-        here_enu_m = self.position_enu_m(now_s)
-        if not self._home_locked and self.flight.home_enu_m != here_enu_m:
-            self.set_home(here_enu_m, now_s, lock=False)
+        if not self._home_locked:
+            self.set_home_here(now_s)
         self.narrator.tell(FirmwareEvent.ARMED)
         begins = self.mode in (FlightMode.TAKEOFF, FlightMode.AUTO)
         if begins and self.flavour.modes.flies_when_armed:
@@ -330,6 +339,11 @@ class Pilot:
         self._auto_armed = False
         self.run.reset()
         self.flight.fall(now_s)
+        if self._flew and self.flight.on_ground:
+            self.stands_since_s = now_s
+            self._flew = False
+        if self.flavour.home_follows_landing and not self._home_locked:
+            self.set_home_here(now_s)
         self.narrator.tell(occasion)
         after = self.flavour.modes.after_flight
         if after is not None and (self.mode in _TASKS or self.mode is FlightMode.RTL):
@@ -445,6 +459,12 @@ class Pilot:
             if self.run.state is not MissionRunState.RUNNING:
                 self.run.start_or_resume(now_s)
         return True
+
+    def set_home_here(self, now_s: float) -> None:
+        """Put home where the vehicle is, and tell everybody if that is elsewhere."""
+        here_enu_m = self.position_enu_m(now_s)
+        if self.flight.home_enu_m != here_enu_m:
+            self.set_home(here_enu_m, now_s, lock=False)
 
     def set_home(self, home_enu_m: Point, now_s: float, *, lock: bool) -> None:
         """Put home elsewhere and tell everybody; locked, it stays there when arming."""

@@ -8,10 +8,12 @@ and attitude targets and RC override are not understood.
 from __future__ import annotations
 
 import dataclasses
+import math
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.battery import BatteryModel
+from sim.autopilot.battery_change import BatteryChange
 from sim.autopilot.commands import CommandExecutor, command_from_message
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import (
@@ -71,7 +73,12 @@ class SimulatedAutopilot:
         self._streams = MessageRates()
         self._parameters = ParameterTable((*flavour.parameters(config), _SIMULATED))
         self._store = MissionStore()
-        self._battery = BatteryModel(config.endurance_s, config.battery_failsafe)
+        self._battery = BatteryModel(
+            config.endurance_s, config.battery_failsafe, config.charge_frac
+        )
+        self._change = BatteryChange(config)
+        self._power_returns_s: float | None = None
+        """When somebody has put the other battery in [s]; None: it has power."""
         self._now_s = start_s
         self._power_up(config, start_s)
 
@@ -97,11 +104,15 @@ class SimulatedAutopilot:
         now_s = self._now_s = max(now_s, self._now_s)
         self._advance(now_s)
         match event:
+            case MavlinkReceived() | Reboot() if self._power_returns_s is not None:
+                pass
             case MavlinkReceived(channel, message):
                 self._receive(channel, message, now_s)
             case Connected(channel):
                 self._streams.open(channel, self._flavour.unasked_streams, now_s)
-                if self._heartbeat_s > now_s:  # otherwise it comes below
+                if (
+                    self._heartbeat_s > now_s and self._power_returns_s is None
+                ):  # otherwise it comes below
                     self._say(mavlink.MAVLINK_MSG_ID_HEARTBEAT, channel, now_s)
             case Disconnected(channel):
                 self._streams.close(channel)
@@ -112,21 +123,56 @@ class SimulatedAutopilot:
                 pass
         if not isinstance(event, TimeAdvanced):  # which has brought about nothing more that is due
             self._advance(now_s)
-        self._report(now_s)
+        if self._power_returns_s is None:
+            self._report(now_s)
         return self._outbox.take()
 
     def next_deadline_s(self) -> float:
         """When `step` should be called at the latest [s]."""
-        deadline_s = min(self._heartbeat_s, self.pilot.deadline_s(), self._streams.deadline_s())
-        transfer_s = self._transfer.deadline_s()
-        return deadline_s if transfer_s is None else min(deadline_s, transfer_s)
+        if self._power_returns_s is not None:
+            return self._power_returns_s
+        due_s = min(self._heartbeat_s, self.pilot.deadline_s(), self._streams.deadline_s())
+        return min(due_s, self._own_deadline_s())
 
     def _advance(self, now_s: float) -> None:
         """Let everything happen that is due, each at its own instant."""
-        while (due_s := self._transfer.deadline_s()) is not None and due_s <= now_s:
+        while (due_s := self._own_deadline_s()) <= now_s:
+            if self._power_returns_s is not None:
+                self._reboot(due_s)
+                continue
             self.pilot.advance(due_s)
-            self._transfer.advance(due_s)
-        self.pilot.advance(now_s)
+            if due_s < self._own_deadline_s():  # the motors have stopped, or run again
+                continue
+            transfer_s = self._transfer.deadline_s()
+            if transfer_s is not None and transfer_s <= due_s:
+                self._transfer.advance(due_s)
+            else:
+                self._change_battery()
+        if self._power_returns_s is None:
+            self.pilot.advance(now_s)
+            if self._own_deadline_s() <= now_s:  # by what has just happened
+                self._advance(now_s)
+
+    def _own_deadline_s(self) -> float:
+        """When something happens that the autopilot knows nothing of, or in a transfer [s]."""
+        if self._power_returns_s is not None:
+            return self._power_returns_s
+        transfer_s = self._transfer.deadline_s()
+        cut = self._change.due(self.pilot)
+        return min(
+            math.inf if transfer_s is None else transfer_s, math.inf if cut is None else cut.off_s
+        )
+
+    def _change_battery(self) -> None:
+        """Give the vehicle the battery that is due; where that cuts its power, be silent."""
+        cut = self._change.due(self.pilot)
+        if cut is None:
+            return
+        self._battery.fill()
+        self.pilot.stands_since_s = None
+        self.pilot.failsafes.battery_changed()
+        if self.config.swap_reboots:
+            self._power_returns_s = cut.on_s
 
     def _report(self, now_s: float) -> None:
         """Send the telemetry that is due, as of now."""
@@ -155,8 +201,9 @@ class SimulatedAutopilot:
 
         In the air the vehicle drops to the ground at once: nothing flies it.
         """
+        self._power_returns_s = None
         east_m, north_m, _ = self.pilot.position_enu_m(now_s)
-        ground_up_m = self.config.start_enu_m[2]
+        ground_up_m = self.pilot.flight.ground_up_m(east_m, north_m)
         here = dataclasses.replace(self.config, start_enu_m=(east_m, north_m, ground_up_m))
         for channel in self._streams.channels:
             self._streams.close(channel)

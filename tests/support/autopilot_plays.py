@@ -311,7 +311,7 @@ def plain(value: Any) -> Any:
 def without_bounce(messages: list[dict[str, Any]]) -> list[dict[str, Any]]:
     """Leave out that the recorded PX4 took its landing for a take-off and a landing again.
 
-    It also took the place of that take-off for its home.
+    Where it landed is its home from then on, as after any landing.
     """
     landings = [
         place
@@ -326,7 +326,6 @@ def without_bounce(messages: list[dict[str, Any]]) -> list[dict[str, Any]]:
         each
         for place, each in enumerate(messages)
         if not (first < place <= last and each["msg"] in bounce)
-        and not (first < place and each["msg"] == "HOME_POSITION")
     ]
 
 

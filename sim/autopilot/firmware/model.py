@@ -186,6 +186,9 @@ class FirmwareModel(ABC):
     pauses_anywhere: bool = False
     """Whether DO_REPOSITION without a place, height and heading stops the vehicle."""
     tells_origin_when_armed: bool = False
+    home_follows_landing: bool = False
+    """Whether home is where the vehicle landed, as soon as the motors stand, rather than from the
+    next arming on."""
     constant_position_at_rest: bool = False
     """Whether the estimator says EKF_CONST_POS_MODE wherever the vehicle stands still, rather
     than only where it has no position."""

@@ -92,6 +92,7 @@ _TEXTS = {
         FirmwareEvent.MISSION_CLIMB: "Climb to {height_m:.1f} meters above home",
         FirmwareEvent.MISSION_OVER: "Mission finished, loitering",
         FirmwareEvent.MISSION_OVER_ON_GROUND: "Mission finished, landed",
+        FirmwareEvent.LANDING_ORDERED: "Landing at current position",
         FirmwareEvent.RETURN_ORDERED: "Returning to launch",
         FirmwareEvent.RETURN_BEGUN: (
             "RTL: start return at {altitude_m:.0f} m ({above_home_m:.0f} m above destination)"
@@ -195,6 +196,7 @@ class Px4Model(FirmwareModel):
     obeys_leg_speed = True
     pauses_anywhere = True
     constant_position_at_rest = True
+    home_follows_landing = True
     coasting_s = math.inf
 
     unasked_streams = MappingProxyType(

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from sim.autopilot.config import Physics, fleet_of
+from sim.autopilot.config import Physics, ServedBase, fleet_of
 from sim.autopilot.options import Endpoint, Transport, parse_endpoint
-from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.model import Base, BaseId, Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.model.frames import DEFAULT_ORIGIN
 
 
@@ -59,6 +59,42 @@ def test_system_ids_begin_again_beyond_the_last() -> None:
 
     assert ids[:2] == [1, 2]
     assert ids[253:256] == [254, 1, 2]
+
+
+def test_missions_of_the_field_give_batteries_bases_and_air() -> None:
+    plain = mission()
+    far = replace(
+        plain.uavs[0], endurance_s=300.0, charge_frac=0.7, airspeed_m_s=9.0, acceleration_m_s2=2.0
+    )
+    field = replace(
+        plain,
+        uavs=(far, *plain.uavs[1:]),
+        bases=(Base(BaseId("b0"), (50.0, 0.0, 7.0), 90.0),),
+        wind_enu_m_s=(3.0, 0.0),
+    )
+    first, second, _ = (member.config for member in fleet_of(field))
+
+    assert (first.endurance_s, first.charge_frac, first.drains_in_flight) == (300.0, 0.7, True)
+    assert (second.endurance_s, second.charge_frac, second.drains_in_flight) == (None, 1.0, False)
+    assert first.bases == second.bases == (ServedBase((50.0, 0.0, 7.0), 90.0),)
+    assert first.grounds_enu_m == ((0.0, 2.0, 3.0), (50.0, 0.0, 7.0))
+    assert first.swap_reboots
+    assert first.airspeed_m_s == 9.0
+    assert first.wind is not None
+    assert first.wind.velocity_enu_m_s == (3.0, 0.0)
+    assert second.wind is None  # the scenario gives it no airspeed
+
+
+def test_options_win_over_missions_of_the_field() -> None:
+    plain = mission()
+    far = replace(plain.uavs[0], endurance_s=300.0, charge_frac=0.7, airspeed_m_s=9.0)
+    field = replace(plain, uavs=(far, *plain.uavs[1:]), wind_enu_m_s=(3.0, 0.0))
+    told = Physics(endurance_s=500.0, wind_enu_m_s=(0.0, 0.0), swap_reboots=False)
+    config = fleet_of(field, physics=told)[0].config
+
+    assert (config.endurance_s, config.charge_frac, config.drains_in_flight) == (500.0, 1.0, False)
+    assert config.wind is None
+    assert not config.swap_reboots
 
 
 def test_unknown_uav_is_an_error() -> None:

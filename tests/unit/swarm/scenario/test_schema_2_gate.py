@@ -22,7 +22,6 @@ COMMANDS: dict[str, list[str]] = {
     "swarm plan --export": ["plan", "FILE", "--export", "plans"],
     "swarm run": ["run", "FILE"],
     "swarm coordinator": ["coordinator", "FILE"],
-    "swarm autopilot": ["autopilot", "FILE"],
     "swarm doctor": ["doctor", "FILE"],
     "swarm study": ["study", "FILE", "--trials", "1"],
     "swarm bench": ["bench", "plan", "FILE"],
