@@ -86,6 +86,10 @@ class CommandExecutor:
 
     def handle(self, command: AutopilotCommand, sender: Sender, now_s: float) -> None:
         """Carry ``command`` out and acknowledge it."""
+        is_camera = command.id == mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST
+        if is_camera and self._pilot.flavour.missions.tells_camera:
+            self._pilot.camera.obey(command.params[0])
+            return
         is_mode = command.id == mavlink.MAV_CMD_DO_SET_MODE
         times = self._pilot.flavour.modes.acknowledgements if is_mode else 1
         self._answer(command.id, lambda: self._carry_out(command, sender, now_s), sender, times)
@@ -119,6 +123,8 @@ class CommandExecutor:
                 if not math.isfinite(seq) or seq < 0.0:
                     return _DENIED
                 return _ACCEPTED if self.set_mission_current(int(seq), sender, now_s) else _FAILED
+            case mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST:
+                return _ACCEPTED if self._pilot.camera.obey(command.params[0]) else _FAILED
             case mavlink.MAV_CMD_DO_SET_HOME:
                 return self._set_home(command, now_s)
             case mavlink.MAV_CMD_GET_HOME_POSITION:
@@ -211,7 +217,7 @@ class CommandExecutor:
             return _DENIED
         if not pilot.takes_targets and not pilot.set_mode(behaviour.for_reposition, now_s):
             return pilot.flavour.refusals.not_now
-        if not (pause or pilot.within_fence(target_enu_m)):
+        if not (pause or pilot.fence.allows_target(target_enu_m)):
             pilot.narrator.tell(FirmwareEvent.TARGET_OUTSIDE_FENCE)
             return pilot.flavour.refusals.outside_fence
         own_speed = pilot.flavour.obeys_leg_speed and 0.0 < speed_m_s < math.inf

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from swarm.model.frames import DEFAULT_ORIGIN, Origin
 
 _AIRSPEED_PER_CRUISE = 1.5
 _MAX_SYSTEM_ID = 254
-_LAND_NEAR_GROUND_M_S = 0.5
+_LAND_M_S = 0.5
 _DESCENT_M_S = 1.5
 """How real ones land, ArduCopter by its defaults. Where nobody lands before the end of the mission,
 landings are quick."""
@@ -137,6 +137,8 @@ class VehicleConfig:
     airspeed_limit_m_s: float | None = None
     """Greatest speed through the air [m/s]; None: half as much again as the cruise speed, and more
     where more is ordered."""
+    takes_fences: bool = True
+    """Polygons to stay in or out of can be uploaded."""
     wind: Wind | None = None
     """The air it flies in; None: still."""
 
@@ -249,9 +251,6 @@ def fleet_of(
     """
     physics = physics or Physics()
     given_m_s2, given_s = physics.acceleration_m_s2, physics.endurance_s
-    landings: dict[str, float] = {}
-    if mission.bases:
-        landings = {"land_m_s": _LAND_NEAR_GROUND_M_S, "descent_m_s": _DESCENT_M_S}
     bases = tuple(ServedBase(base.position_enu_m, base.swap_s) for base in mission.bases)
     places = {uav.id: place for place, uav in enumerate(mission.uavs)}
     members = []
@@ -276,8 +275,9 @@ def fleet_of(
             position_failsafe_s=physics.position_failsafe_s,
             acceleration_m_s2=uav.acceleration_m_s2 if given_m_s2 is None else given_m_s2,
             airspeed_limit_m_s=uav.airspeed_m_s,
-            **landings,
             wind=physics.wind(mission, place),
         )
+        if mission.bases:
+            config = replace(config, land_m_s=_LAND_M_S, descent_m_s=_DESCENT_M_S)
         members.append(FleetMember(uav.id, config))
     return tuple(members)

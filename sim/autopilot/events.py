@@ -142,6 +142,16 @@ class FirmwareEvent(Enum):
     MODE_REFUSED = auto()
     """[mode, reason]"""
     TARGET_OUTSIDE_FENCE = auto()
+    FENCE_RECEIVED = auto()
+    FENCE_REFUSED = auto()
+    """[reason]"""
+    FENCE_WITHOUT_HOME = auto()
+    """It was taken, and keeps the vehicle out of its own home."""
+    FENCE_BREACHED = auto()
+    FENCE_ACTED = auto()
+    """The mode was changed for that."""
+    FENCE_CLEARED = auto()
+    """The vehicle is where it may be again."""
     MISSION_RECEIVED = auto()
     MISSION_REPLACED = auto()
     """While it is flown, and the vehicle takes up the new one."""

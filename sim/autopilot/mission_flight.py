@@ -5,9 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
 from sim.autopilot.events import FirmwareEvent
 from sim.autopilot.flight import FlightMode, Milestone
-from sim.autopilot.mission_store import StoredMissionItem, item_place_enu_m
+from sim.autopilot.mission_item import StoredMissionItem, item_place_enu_m
 from sim.autopilot.parameters import ParameterRole
 from sim.world.motion import Point
 
@@ -95,6 +97,17 @@ class MissionFlight:
         """Fly at another speed [m/s] until AUTO is left."""
         self._speed_m_s = speed_m_s
         self._flight.override_cruise(speed_m_s, now_s)
+
+    def trigger(self, item: StoredMissionItem) -> None:
+        """Set the camera's trigger; where the camera is another component, tell that."""
+        self._pilot.camera.obey(item.params[0])
+        if self._behaviour.tells_camera:
+            params = *item.params[:3], 0.0, 0.0, 0.0, 0.0
+            self._pilot.outbox.broadcast(
+                mavlink.MAVLink_command_long_message(
+                    self._pilot.config.system_id, 0, item.command, 0, *params
+                )
+            )
 
     def finish(self, now_s: float) -> None:
         """Stay where the last item ended: in the air, or on the ground with motors stopped."""

@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim.autopilot.events import FirmwareEvent
 from sim.autopilot.flight import Milestone
 from sim.autopilot.mission_flight import MissionFlight
-from sim.autopilot.mission_store import StoredMissionItem
+from sim.autopilot.mission_item import StoredMissionItem
 
 if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
@@ -205,7 +205,12 @@ class MissionRun:
             self._pilot.narrator.tell(FirmwareEvent.ITEM_BEGUN, seq=seq, name=item.name)
             if item.is_navigation:
                 break
-            if item.command == mavlink.MAV_CMD_DO_GUIDED_LIMITS:
+            if item.command == mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST:
+                self.flight.trigger(item)
+                if not self._behaviour.tells_camera:
+                    seq += 1
+                    continue
+            elif item.command == mavlink.MAV_CMD_DO_GUIDED_LIMITS:
                 self._limit_s = item.params[0]
             elif item.params[1] > 0.0:
                 self.flight.change_speed(item.params[1], now_s)

@@ -10,13 +10,17 @@ import math
 from collections.abc import Callable
 
 from sim.autopilot.battery import BatteryModel
+from sim.autopilot.camera import CameraTrigger
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, Narrator, Outbox
 from sim.autopilot.failsafes import FailsafeMonitor
+from sim.autopilot.fence import FenceStore
+from sim.autopilot.fence_monitor import FenceMonitor
 from sim.autopilot.firmware.model import FirmwareModel
 from sim.autopilot.flight import FlightMode, FlightStateMachine, Milestone, MotionPhase
+from sim.autopilot.mission_item import StoredMissionItem
 from sim.autopilot.mission_run import MissionRun, MissionRunState
-from sim.autopilot.mission_store import MissionStore, StoredMissionItem
+from sim.autopilot.mission_store import MissionStore
 from sim.autopilot.parameters import ParameterRole, ParameterServer, ParameterTable
 from sim.autopilot.positions import home_position, origin_position
 from sim.autopilot.readiness import PowerUpStage, Readiness
@@ -31,8 +35,8 @@ _TASKS = frozenset({FlightMode.TAKEOFF, FlightMode.AUTO, FlightMode.LAND})
 class Pilot:
     """The autopilot of one vehicle, from power-up at ``boot_s`` on.
 
-    Parameters, mission and battery outlast a reboot. ``mode_changed`` is called with the time [s]
-    as soon as the mode is another one.
+    Parameters, mission, fence and battery outlast a reboot. ``mode_changed`` is called with the
+    time [s] as soon as the mode is another one.
     """
 
     def __init__(
@@ -41,6 +45,7 @@ class Pilot:
         flavour: FirmwareModel,
         parameters: ParameterTable,
         store: MissionStore,
+        fence_store: FenceStore,
         outbox: Outbox,
         battery: BatteryModel,
         boot_s: float,
@@ -79,6 +84,9 @@ class Pilot:
         """From when on the mission on the vehicle can be begun [s]."""
         self._prearm_text_s = boot_s + _PREARM_TEXT_S
         self.failsafes = FailsafeMonitor(self)
+        self.fence_store = fence_store
+        self.fence = FenceMonitor(self, fence_store)
+        self.camera = CameraTrigger()
 
     # --- Time -------------------------------------------------------------------
 
@@ -105,6 +113,7 @@ class Pilot:
             self.run.repeat_s,
             self._disarm_s,
             self.failsafes.deadline_s(),
+            self.fence.deadline_s(),
         )
 
     def _happen(self, what: int, at_s: float) -> None:
@@ -116,6 +125,7 @@ class Pilot:
             self.run.repeat,
             lambda at_s: self._disarm(at_s, self._disarm_occasion),
             self.failsafes.advance,
+            self.fence.advance,
         )
         happenings[what](at_s)
 
@@ -291,6 +301,7 @@ class Pilot:
             return False
         self.armed = True
         self.stands_since_s = None
+        self.fence.armed(now_s)
         if not self.config.drains_in_flight:
             self.battery.start(now_s)
         self._disarm_unused(now_s)
@@ -308,7 +319,9 @@ class Pilot:
     def obstacles(self) -> tuple[str, ...]:
         """Why the vehicle can't be armed in its mode, in its words; empty when it can."""
         obstacle = self.readiness.obstacle(self.mode)
-        return self.failsafes.obstacles if obstacle is None else (obstacle,)
+        if obstacle is not None:
+            return (obstacle,)
+        return (*self.failsafes.obstacles, *self.fence.obstacles)
 
     def _arming_obstacles(self, *, forced: bool) -> tuple[str, ...]:
         if not self.flight.on_ground:
@@ -336,14 +349,16 @@ class Pilot:
         self.armed = False
         self.battery.stop(now_s)
         self.failsafes.disarmed()
+        self.fence.disarmed(now_s)
         self._auto_armed = False
         self.run.reset()
         self.flight.fall(now_s)
         if self._flew and self.flight.on_ground:
             self.stands_since_s = now_s
             self._flew = False
-        if self.flavour.home_follows_landing and not self._home_locked:
-            self.set_home_here(now_s)
+            if self.flavour.home_follows_landing:
+                self._home_locked = False
+                self.set_home_here(now_s)
         self.narrator.tell(occasion)
         after = self.flavour.modes.after_flight
         if after is not None and (self.mode in _TASKS or self.mode is FlightMode.RTL):
@@ -406,11 +421,6 @@ class Pilot:
         self._auto_armed = True
         self._position_control = False
         self.flight.take_off(up_m, now_s)
-
-    def within_fence(self, target_enu_m: Point) -> bool:
-        """Whether a target lies inside the vehicle's own fence around home."""
-        radius_m = self.flavour.fence_radius_m(self.parameters)
-        return not 0.0 < radius_m < math.dist(target_enu_m[:2], self.flight.home_enu_m[:2])
 
     def fly_guided(self, target_enu_m: Point, now_s: float, speed_m_s: float | None = None) -> None:
         """Fly to a place at once, in the mode for it, at the usual speed or one of its own.

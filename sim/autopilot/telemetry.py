@@ -127,7 +127,7 @@ class TelemetryReporter:
     def _state(self) -> int:
         """MAV_STATE."""
         pilot = self._pilot
-        if pilot.readiness.booted and pilot.failsafes.acts:
+        if pilot.readiness.booted and (pilot.failsafes.acts or pilot.fence.acts):
             return int(mavlink.MAV_STATE_CRITICAL)
         return pilot.flavour.system_status(pilot)
 
@@ -148,6 +148,7 @@ class TelemetryReporter:
         present, enabled, healthy = pilot.flavour.sensors(pilot)
         lost = _GPS if pilot.readiness.gps_lost else 0
         lost |= _BATTERY if pilot.battery.level > ChargeLevel.FINE else 0
+        lost |= _FENCE if pilot.fence.breached else 0
         fenced = _FENCE if pilot.parameters.value("FENCE_ENABLE") else 0
         return mavlink.MAVLink_sys_status_message(
             *(present, enabled | fenced, healthy & ~lost, 0),

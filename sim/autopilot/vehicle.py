@@ -27,6 +27,7 @@ from sim.autopilot.events import (
     TimeAdvanced,
     VehicleEvent,
 )
+from sim.autopilot.fence import FenceStore
 from sim.autopilot.firmware.model import FirmwareModel
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.message_rates import MessageRates
@@ -73,6 +74,7 @@ class SimulatedAutopilot:
         self._streams = MessageRates()
         self._parameters = ParameterTable((*flavour.parameters(config), _SIMULATED))
         self._store = MissionStore()
+        self._fence_store = FenceStore(config.origin)
         self._battery = BatteryModel(
             config.endurance_s, config.battery_failsafe, config.charge_frac
         )
@@ -88,6 +90,7 @@ class SimulatedAutopilot:
             self._flavour,
             self._parameters,
             self._store,
+            self._fence_store,
             self._outbox,
             self._battery,
             now_s,

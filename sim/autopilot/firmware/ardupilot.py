@@ -18,6 +18,7 @@ from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, TextTemplate
 from sim.autopilot.firmware.model import (
     FailsafeBehaviour,
+    FenceBehaviour,
     FirmwareModel,
     GcsFailsafe,
     MissionBehaviour,
@@ -42,6 +43,15 @@ _GROUND_LOST_LANDS = (5.0, 7.0)
 """Values of FS_GCS_ENABLE."""
 _FENCE_CIRCLE = 2
 """Bit of FENCE_TYPE."""
+_FENCE_POLYGON = 4
+_FENCE_MODES = {
+    1: FlightMode.RTL,
+    2: FlightMode.LAND,
+    3: FlightMode.RTL,
+    4: FlightMode.BRAKE,
+    5: FlightMode.RTL,
+}
+"""By FENCE_ACTION, without what it falls back on; SmartRTL is not simulated."""
 _REAL = mavlink.MAV_PARAM_TYPE_REAL32
 _INT8 = mavlink.MAV_PARAM_TYPE_INT8
 _INT16 = mavlink.MAV_PARAM_TYPE_INT16
@@ -76,7 +86,9 @@ _POSITION_CONTROL = (
     | mavlink.MAV_SYS_STATUS_SENSOR_XY_POSITION_CONTROL
 )
 
+_DEBUG = mavlink.MAV_SEVERITY_DEBUG
 _INFO = mavlink.MAV_SEVERITY_INFO
+_NOTICE = mavlink.MAV_SEVERITY_NOTICE
 _WARNING = mavlink.MAV_SEVERITY_WARNING
 _CRITICAL = mavlink.MAV_SEVERITY_CRITICAL
 
@@ -90,8 +102,14 @@ _TEXTS = {
         FirmwareEvent.ITEM_BEGUN: "Mission: {seq} {name}",
         FirmwareEvent.WAYPOINT_REACHED: "Reached command #{seq}",
     },
+    _DEBUG: {FirmwareEvent.FENCE_RECEIVED: "Fence Indexed OK"},
+    _NOTICE: {
+        FirmwareEvent.FENCE_BREACHED: "Polygon fence breached",
+        FirmwareEvent.FENCE_CLEARED: "Fence breach cleared",
+    },
     _WARNING: {
         FirmwareEvent.NO_SUCH_MODE: "No such mode {number}",
+        FirmwareEvent.FENCE_REFUSED: "{reason}",
         FirmwareEvent.MODE_REFUSED: "Mode change to {mode} failed: {reason}",
     },
     _CRITICAL: {
@@ -139,6 +157,7 @@ class ArduCopterModel(FirmwareModel):
         | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
         | mavlink.MAV_PROTOCOL_CAPABILITY_SET_POSITION_TARGET_GLOBAL_INT
         | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+        | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     )
     vtol_state = mavlink.MAV_VTOL_STATE_MC
     modes = ModeBehaviour(
@@ -172,6 +191,7 @@ class ArduCopterModel(FirmwareModel):
         ground_regained=TextTemplate(_WARNING, "GCS Failsafe Cleared"),
         critical_when_disarmed=True,
     )
+    fence_behaviour = FenceBehaviour("Vehicle breaching Polygon fence", tells_status=True)
     disarm_delay_after_landing = ParameterRole.DISARM_DELAY_S
     disarms_at_once = frozenset({FlightMode.RTL, FlightMode.LAND})
 
@@ -234,6 +254,8 @@ class ArduCopterModel(FirmwareModel):
             ParameterEntry("FENCE_ENABLE", 0.0, _INT8),
             ParameterEntry("FENCE_TYPE", 7.0, _INT8),
             ParameterEntry("FENCE_RADIUS", 300.0, _REAL, least=30.0),
+            ParameterEntry("FENCE_ACTION", 1.0, _INT8, least=0.0),
+            ParameterEntry("FENCE_TOTAL", 0.0, _INT8, read_only=True),
             ParameterEntry("AUTO_OPTIONS", 0.0, _INT32),
             ParameterEntry("MIS_TOTAL", 0.0, _INT16, read_only=True),
             ParameterEntry("MIS_RESTART", 0.0, _INT8),
@@ -257,6 +279,15 @@ class ArduCopterModel(FirmwareModel):
         circle = int(parameters.value("FENCE_TYPE")) & _FENCE_CIRCLE
         on = parameters.value("FENCE_ENABLE") and circle
         return parameters.value("FENCE_RADIUS") if on else 0.0
+
+    def fence_on(self, parameters: ParameterTable) -> bool:
+        """Where fences are on, and polygons among them."""
+        polygon = int(parameters.value("FENCE_TYPE")) & _FENCE_POLYGON
+        return bool(parameters.value("FENCE_ENABLE") and polygon)
+
+    def fence_mode(self, parameters: ParameterTable) -> FlightMode | None:
+        """It returns, through the fence if need be."""
+        return _FENCE_MODES.get(int(parameters.value("FENCE_ACTION")))
 
     def mode_commanded(self, main: float, sub: float) -> int | None:
         """``custom_mode`` from parameters 2 and 3 of DO_SET_MODE; the third says nothing here."""

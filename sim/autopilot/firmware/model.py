@@ -96,6 +96,9 @@ class MissionBehaviour:
     """Whether MISSION_CURRENT goes on telling the last item after the motors stopped."""
     gives_way: bool = False
     """Whether an item may let targets be told for a time."""
+    tells_camera: bool = False
+    """Whether the trigger of a camera is that of another component: an item for it is told on, and
+    as reached; a command for it is left to that component, and not acknowledged."""
     forgets_mode: bool = False
     """Whether the mode becomes another one at the end, or at an item that returns home."""
 
@@ -121,6 +124,23 @@ class FailsafeBehaviour:
     from then until the motors stand, cause or not."""
     deaf_after_s: float = math.inf
     """To who has not been heard for so long it says no texts any more [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class FenceBehaviour:
+    """How an uploaded fence is heeded."""
+
+    obstacle: str
+    """Why a vehicle that breaks it can't be armed."""
+    inclusions_add: bool = False
+    """Whether it is enough to be in one of several areas to stay in."""
+    needs_home_inside: bool = False
+    """Whether a fence that keeps the vehicle out of its home is no fence."""
+    tells_status: bool = False
+    """Whether FENCE_STATUS is said."""
+    critical: bool = False
+    """Whether the heartbeat says CRITICAL until somebody changes the mode that was entered, and
+    checks fail in flight too."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -168,6 +188,7 @@ class FirmwareModel(ABC):
     missions: MissionBehaviour
     refusals: RefusalCodes
     failsafe_behaviour: FailsafeBehaviour
+    fence_behaviour: FenceBehaviour
     parameter_habits: ParameterBehaviour
     disarm_delay_after_landing: ParameterRole
     """What says how long after landing the motors stop..."""
@@ -187,8 +208,8 @@ class FirmwareModel(ABC):
     """Whether DO_REPOSITION without a place, height and heading stops the vehicle."""
     tells_origin_when_armed: bool = False
     home_follows_landing: bool = False
-    """Whether home is where the vehicle landed, as soon as the motors stand, rather than from the
-    next arming on."""
+    """Whether home is where the vehicle landed, as soon as the motors stand and whoever put it
+    elsewhere, rather than from the next arming on unless somebody did."""
     constant_position_at_rest: bool = False
     """Whether the estimator says EKF_CONST_POS_MODE wherever the vehicle stands still, rather
     than only where it has no position."""
@@ -239,6 +260,14 @@ class FirmwareModel(ABC):
     @abstractmethod
     def fence_radius_m(self, parameters: ParameterTable) -> float:
         """Radius of the vehicle's own fence around home [m]; 0: it has none."""
+
+    @abstractmethod
+    def fence_on(self, parameters: ParameterTable) -> bool:
+        """Whether an uploaded fence counts."""
+
+    @abstractmethod
+    def fence_mode(self, parameters: ParameterTable) -> FlightMode | None:
+        """The mode that is entered where it is broken; None: that is only said."""
 
     @abstractmethod
     def mode_commanded(self, main: float, sub: float) -> int | None:

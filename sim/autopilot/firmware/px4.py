@@ -19,6 +19,7 @@ from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
 from sim.autopilot.firmware.model import (
     FailsafeBehaviour,
+    FenceBehaviour,
     FirmwareModel,
     GcsFailsafe,
     MissionBehaviour,
@@ -65,6 +66,8 @@ _PREARM = mavlink.MAV_SYS_STATUS_PREARM_CHECK
 
 _GROUND_LOST_MODES = {2: FlightMode.RTL, 3: FlightMode.LAND}
 """By NAV_DLL_ACT; it holds, and falls, in other ways than are simulated."""
+_FENCE_MODES = {2: FlightMode.LOITER, 3: FlightMode.RTL, 5: FlightMode.LAND}
+"""By GF_ACTION; it warns, and terminates the flight, in other ways than are simulated."""
 _GROUND_LOST_SPARED = {1: FlightMode.AUTO, 2: FlightMode.LOITER}
 """By bit of COM_DLL_EXCEPT."""
 _FAILSAFE_HOLD_S = 5.0
@@ -105,6 +108,9 @@ _TEXTS = {
         FirmwareEvent.TAKE_OFF_RAISED: "Using minimum takeoff altitude: {height_m:.2f} m",
         FirmwareEvent.NO_SUCH_MODE: "Unsupported auto mode",
         FirmwareEvent.MODE_REFUSED: "Switching to mode '{mode}' is currently not available",
+        FirmwareEvent.FENCE_WITHOUT_HOME: "Geofence invalid, doesn't contain Home position",
+        FirmwareEvent.FENCE_BREACHED: "Geofence: approaching or outside geofence",
+        FirmwareEvent.FENCE_ACTED: "Failsafe activated",
         FirmwareEvent.TARGET_OUTSIDE_FENCE: "Reposition is outside geofence",
         FirmwareEvent.MISSION_UNAVAILABLE: "No valid mission available, loitering",
         FirmwareEvent.MISSION_UNAVAILABLE_ON_GROUND: (
@@ -128,6 +134,7 @@ class Px4Model(FirmwareModel):
         | mavlink.MAV_PROTOCOL_CAPABILITY_COMMAND_INT
         | mavlink.MAV_PROTOCOL_CAPABILITY_PARAM_ENCODE_BYTEWISE
         | mavlink.MAV_PROTOCOL_CAPABILITY_MAVLINK2
+        | mavlink.MAV_PROTOCOL_CAPABILITY_MISSION_FENCE
     )
     vtol_state = mavlink.MAV_VTOL_STATE_UNDEFINED
     version = 1 << 24 | 17 << 16 | 255
@@ -157,6 +164,7 @@ class Px4Model(FirmwareModel):
         climbs_first=True,
         repeats_reached=10,
         keeps_number=True,
+        tells_camera=True,
         forgets_mode=True,
     )
     refusals = RefusalCodes(
@@ -168,6 +176,9 @@ class Px4Model(FirmwareModel):
         outside_fence=mavlink.MAV_RESULT_ACCEPTED,
     )
     disarm_delay_after_landing = ParameterRole.DISARM_LANDED_S
+    fence_behaviour = FenceBehaviour(
+        "Geofence breached", inclusions_add=True, needs_home_inside=True, critical=True
+    )
     failsafe_behaviour = FailsafeBehaviour(
         hold_s=_FAILSAFE_HOLD_S,
         words=(TextTemplate(_CRITICAL, "Failsafe activated"),),
@@ -286,6 +297,14 @@ class Px4Model(FirmwareModel):
     def fence_radius_m(self, parameters: ParameterTable) -> float:
         """A circle, unless it is 0."""
         return parameters.value("GF_MAX_HOR_DIST")
+
+    def fence_on(self, parameters: ParameterTable) -> bool:
+        """Unless nothing is done about it."""
+        return parameters.value("GF_ACTION") > 0.0
+
+    def fence_mode(self, parameters: ParameterTable) -> FlightMode | None:
+        """It holds its place, by default."""
+        return _FENCE_MODES.get(int(parameters.value("GF_ACTION")))
 
     def mode_commanded(self, main: float, sub: float) -> int | None:
         """``custom_mode`` from parameters 2 and 3 of DO_SET_MODE."""

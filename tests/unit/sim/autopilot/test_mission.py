@@ -161,6 +161,14 @@ def test_too_many_items_and_other_kinds_of_missions_are_refused() -> None:
     ground.wait(5.0)
     answer = ground.send(mavlink.MAVLink_mission_count_message(1, 1, 1000))
     assert the(answer, "MISSION_ACK").type == NO_SPACE
+    rally = mavlink.MAV_MISSION_TYPE_RALLY
+    answer = ground.send(mavlink.MAVLink_mission_count_message(1, 1, 2, rally))
+    assert (answer[0].type, answer[0].mission_type) == (mavlink.MAV_MISSION_UNSUPPORTED, rally)
+
+
+def test_firmware_without_fences_says_so() -> None:
+    ground = ground_station(takes_fences=False)
+    ground.wait(5.0)
     fence = mavlink.MAV_MISSION_TYPE_FENCE
     answer = ground.send(mavlink.MAVLink_mission_count_message(1, 1, 2, fence))
     assert (answer[0].type, answer[0].mission_type) == (mavlink.MAV_MISSION_UNSUPPORTED, fence)
