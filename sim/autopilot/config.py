@@ -11,10 +11,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sim.autopilot.turning_motion import TurningMotion
 from sim.world.motion import IdealMotion, Motion, Point, SmoothMotion
 from sim.world.wind import Wind, WindyMotion, gusts_of
 from swarm.model import Mission, UavId
 from swarm.model.frames import DEFAULT_ORIGIN, Origin
+from swarm.model.mission import PLAIN_CONSTRAINTS
 
 _AIRSPEED_PER_CRUISE = 1.5
 _MAX_SYSTEM_ID = 254
@@ -134,6 +136,8 @@ class VehicleConfig:
     """Time without GPS after which the firmware lands the vehicle [s]; None: it hovers."""
     acceleration_m_s2: float | None = None
     """Greatest acceleration [m/s²]; None: speeds change in no time."""
+    rounds_corners: bool = False
+    """Passes waypoints without a stop and turns as recorded ones do; only with an acceleration."""
     airspeed_limit_m_s: float | None = None
     """Greatest speed through the air [m/s]; None: half as much again as the cruise speed, and more
     where more is ordered."""
@@ -179,7 +183,8 @@ class VehicleConfig:
         """How it moves from its start on."""
         motion: Motion = IdealMotion(self.start_enu_m)
         if self.acceleration_m_s2 is not None:
-            motion = SmoothMotion(self.start_enu_m, self.acceleration_m_s2)
+            kind = TurningMotion if self.rounds_corners else SmoothMotion
+            motion = kind(self.start_enu_m, self.acceleration_m_s2)
         if self.wind is not None:
             exact = self.airspeed_limit_m_s is not None
             ground_up_m = self.start_enu_m[2]
@@ -274,6 +279,7 @@ def fleet_of(
             battery_failsafe=physics.battery_failsafe,
             position_failsafe_s=physics.position_failsafe_s,
             acceleration_m_s2=uav.acceleration_m_s2 if given_m_s2 is None else given_m_s2,
+            rounds_corners=not PLAIN_CONSTRAINTS.issuperset(mission.constraints),
             airspeed_limit_m_s=uav.airspeed_m_s,
             wind=physics.wind(mission, place),
         )

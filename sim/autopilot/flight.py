@@ -41,6 +41,9 @@ _FALL_M_S = 10.0
 
 _LEAST_SPEED_M_S = 0.01
 
+_NEAR_S = 1e-4
+"""How exactly it is found when a target is near enough [s]."""
+
 _NEAR_GROUND_M = 10.0
 """From here down a landing is slow [m]: ArduCopter's LAND_ALT_LOW, PX4's MPC_LAND_ALT1."""
 
@@ -89,6 +92,9 @@ class FlightStateMachine:
         self._order: tuple[Point, float] = (config.start_enu_m, _LEAST_SPEED_M_S)
         """Place [m] and speed [m/s] of the last leg."""
         self._hindered: frozenset[MotionPhase] = frozenset()
+        self._near_m = 0.0
+        self._near_s: float | None = None
+        """When the target is near enough [s]; None: when it is there."""
         self._is_high = False
         """It lands, and is as yet far from the ground."""
 
@@ -117,6 +123,7 @@ class FlightStateMachine:
             MotionPhase.RETURNING,
         ):
             self._fly(self._order[0], speed_m_s, now_s)
+            self._near_s = self._is_near_s(now_s) if self._near_s is not None else None
 
     def hinder(self, activities: frozenset[MotionPhase], now_s: float) -> None:
         """Keep the vehicle where it is during these activities, until told otherwise."""
@@ -138,15 +145,42 @@ class FlightStateMachine:
         elif self.activity is not MotionPhase.SPOOLING_UP:
             self._lift(now_s)
 
-    def navigate(self, target_enu_m: Point, now_s: float, speed_m_s: float | None = None) -> None:
-        """Fly straight to a place, in place of whatever was being done."""
+    def navigate(
+        self,
+        target_enu_m: Point,
+        now_s: float,
+        speed_m_s: float | None = None,
+        near_m: float = 0.0,
+    ) -> None:
+        """Fly straight to a place, in place of whatever was being done.
+
+        With ``near_m`` it is reached as soon as it is so near, and the vehicle does not stop by
+        itself before it is there.
+        """
         speed_m_s = self.cruise_m_s if speed_m_s is None else speed_m_s
         self._leave(MotionPhase.NAVIGATING, target_enu_m, speed_m_s, now_s)
+        self._near_m = near_m
+        self._near_s = self._is_near_s(now_s)
+
+    def _is_near_s(self, now_s: float) -> float | None:
+        """When the vehicle comes near enough to its target [s]; None: where it stops there."""
+        arrives_s = self.motion.arrives_s
+        if self._near_m <= 0.0 or arrives_s is None or self.activity in self._hindered:
+            return None
+        far_s, near_s = now_s, arrives_s
+        while near_s - far_s > _NEAR_S:
+            middle_s = 0.5 * (far_s + near_s)
+            place_enu_m = self.motion.position_enu_m(middle_s)
+            if math.dist(place_enu_m, self.motion.target_enu_m) <= self._near_m:
+                near_s = middle_s
+            else:
+                far_s = middle_s
+        return near_s
 
     def hold(self, now_s: float) -> None:
         """Stay in the air where the vehicle is; on the ground, stay there."""
         self.motion.stop(now_s)
-        self._timer_s = None
+        self._timer_s = self._near_s = None
         if self.on_ground or self.activity is MotionPhase.TOUCHED_DOWN:
             self.activity = MotionPhase.GROUNDED
         else:
@@ -181,7 +215,9 @@ class FlightStateMachine:
         """When the activity ends by itself [s]; None if it lasts."""
         if self.activity in (MotionPhase.GROUNDED, MotionPhase.HOLDING):
             return None
-        return self.motion.arrives_s if self._timer_s is None else self._timer_s
+        if self._timer_s is not None:
+            return self._timer_s
+        return self.motion.arrives_s if self._near_s is None else self._near_s
 
     def advance(self, at_s: float) -> Milestone:
         """End the current activity at its deadline ``at_s`` and begin what follows."""
@@ -191,6 +227,9 @@ class FlightStateMachine:
             case MotionPhase.TAKING_OFF:
                 self.hold(at_s)
                 return Milestone.TAKEN_OFF
+            case MotionPhase.NAVIGATING if self._near_s is not None:
+                self._near_s = None
+                return Milestone.REACHED
             case MotionPhase.NAVIGATING:
                 self.hold(at_s)
                 return Milestone.REACHED
@@ -250,7 +289,8 @@ class FlightStateMachine:
         self, activity: MotionPhase, target_enu_m: Point, speed_m_s: float, now_s: float
     ) -> None:
         self.activity = activity
-        self._timer_s = None
+        self._timer_s = self._near_s = None
+        self._near_m = 0.0
         self._fly(target_enu_m, speed_m_s, now_s)
 
     def _fly(self, target_enu_m: Point, speed_m_s: float, now_s: float) -> None:

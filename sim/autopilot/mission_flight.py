@@ -52,8 +52,11 @@ class MissionFlight:
         place = self._place(replace(item, lat_e7=0, lon_e7=0), now_s)
         self._pilot.lift(max(place[2], self._pilot.position_enu_m(now_s)[2]), now_s)
 
-    def navigate(self, item: StoredMissionItem, now_s: float) -> None:
-        """Fly to the place of the item; from the ground only where it is risen to first."""
+    def navigate(self, item: StoredMissionItem, now_s: float, *, passes: bool) -> None:
+        """Fly to the place of the item; from the ground only where it is risen to first.
+
+        Where the mission goes on from there at once, it ``passes`` the place without a stop.
+        """
         self._after_climb = None
         if self._speed_m_s is not None:
             self._flight.override_cruise(self._speed_m_s, now_s)
@@ -73,7 +76,15 @@ class MissionFlight:
             self._pilot.stay_on_ground(now_s)
         else:
             self.climb_due = False
-            self._flight.navigate(place, now_s)
+            self._flight.navigate(place, now_s, near_m=self._near_m(item, passes=passes))
+
+    def _near_m(self, item: StoredMissionItem, *, passes: bool) -> float:
+        """How near a waypoint is near enough [m]; 0 where the vehicle stops there."""
+        if not passes or not self._pilot.config.rounds_corners:
+            return 0.0
+        own_m = item.params[1] if self._behaviour.item_radius else 0.0
+        usual_m = self._pilot.parameters.value_si(ParameterRole.CORNER_RADIUS_M)
+        return own_m if own_m > 0.0 else usual_m
 
     def give_way(self, now_s: float) -> None:
         """Stay where the vehicle is, and fly to the targets that are told."""

@@ -243,7 +243,15 @@ class MissionRun:
             case mavlink.MAV_CMD_NAV_LAND if item.lat_e7 == 0 and item.lon_e7 == 0:
                 self._land(now_s)
             case _:
-                self.flight.navigate(item, now_s)
+                self.flight.navigate(item, now_s, passes=self._passes(item))
+
+    def _passes(self, item: StoredMissionItem) -> bool:
+        """Whether the mission goes on from a place to another without a pause."""
+        following = self._store.next_navigation((self.current or 0) + 1)
+        after = None if following is None else self._store.item(following)
+        waypoint = mavlink.MAV_CMD_NAV_WAYPOINT
+        on = item.command == waypoint and after is not None and after.command == waypoint
+        return on and not item.params[0] > 0.0
 
     def _leave_by_returning(self, now_s: float) -> None:
         """Call the item done and leave the mission, for the mode that returns home."""

@@ -33,6 +33,7 @@ class ParameterRole(Enum):
     DISARM_DELAY_S = "disarm delay"
     DISARM_LANDED_S = "disarm delay after landing"
     TAKE_OFF_HEIGHT_M = "take-off height"
+    CORNER_RADIUS_M = "corner radius"
 
 
 _FOLLOWED = {ParameterRole.TAKE_OFF_M_S: ParameterRole.CLIMB_M_S}

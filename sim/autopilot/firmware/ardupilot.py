@@ -236,7 +236,7 @@ class ArduCopterModel(FirmwareModel):
             ),
             ParameterEntry("WP_ACC", 2.5, _REAL, least=0.5),
             ParameterEntry("WP_JERK", 1.0, _REAL, least=1.0),
-            ParameterEntry("WP_RADIUS_M", 2.0, _REAL, least=0.05),
+            ParameterEntry("WP_RADIUS_M", 2.0, _REAL, ParameterRole.CORNER_RADIUS_M, least=0.05),
             ParameterEntry(
                 "LAND_SPD_MS", config.land_m_s, _REAL, ParameterRole.LAND_M_S, least=0.1
             ),

@@ -96,6 +96,8 @@ class MissionBehaviour:
     """Whether MISSION_CURRENT goes on telling the last item after the motors stopped."""
     gives_way: bool = False
     """Whether an item may let targets be told for a time."""
+    item_radius: bool = False
+    """Whether a waypoint may say how near is near enough, rather than the parameter alone."""
     tells_camera: bool = False
     """Whether the trigger of a camera is that of another component: an item for it is told on, and
     as reached; a command for it is left to that component, and not acknowledged."""

@@ -165,6 +165,7 @@ class Px4Model(FirmwareModel):
         repeats_reached=10,
         keeps_number=True,
         tells_camera=True,
+        item_radius=True,
         forgets_mode=True,
     )
     refusals = RefusalCodes(
@@ -276,7 +277,7 @@ class Px4Model(FirmwareModel):
             ),
             ParameterEntry("MPC_XY_VEL_MAX", max(12.0, config.cruise_m_s), _REAL, least=0.0),
             ParameterEntry("MPC_Z_V_AUTO_UP", 3.0, _REAL, ParameterRole.CLIMB_M_S, least=0.1),
-            ParameterEntry("NAV_ACC_RAD", 2.0, _REAL, least=0.05),
+            ParameterEntry("NAV_ACC_RAD", 2.0, _REAL, ParameterRole.CORNER_RADIUS_M, least=0.05),
             ParameterEntry("NAV_DLL_ACT", 0.0, _INT32, least=0.0),
             ParameterEntry("RTL_DESCEND_ALT", 10.0, _REAL, least=0.0),
             ParameterEntry("RTL_LAND_DELAY", 0.0, _REAL, ParameterRole.RETURN_WAIT_S),
