@@ -143,6 +143,14 @@ def agent(
             "after it.",
         ),
     ] = False,
+    ready_by_itself: Annotated[
+        bool,
+        typer.Option(
+            "--ready-by-itself",
+            help="The vehicle is simulated: landed for another battery it starts again once that "
+            "is full. Without this a person has to say swarm ready first.",
+        ),
+    ] = False,
     fence_radius_m: Annotated[
         float,
         typer.Option(
@@ -239,6 +247,9 @@ def agent(
             position_rate_hz=position_rate_hz,
             battery_reserve_frac=_reserve_frac(battery_reserve, brief, uav),
             raises_jerk=not keep_jerk,
+            ready_by_itself=ready_by_itself,
+            zones=tuple(spec.zone() for spec in brief.zones),
+            zone_margin_m=brief.zone_margin_m,
             fence_radius_m=fence_radius_m,
             fence_height_m=fence_height_m,
         ).for_speedup(speedup)

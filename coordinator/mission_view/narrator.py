@@ -232,9 +232,16 @@ class MissionNarrator:
                 self.tell(kind, f"{uav} {how}{because(note)}", now_s, uavs=[uav])
         elif phase in _IN_FLIGHT and note and note != self._remarks.get(uav):
             self._remarks[uav] = note
+            if self._is_of_visit(note):  # its claim has told that already
+                return
             self.tell(EventKind.REMARK, f"{uav}: {note}", now_s, uavs=[uav])
         elif phase is StatusPhase.HOME and changed:
             self.tell(EventKind.HOME, f"{uav} is home", now_s, uavs=[uav])
+
+    def _is_of_visit(self, note: str) -> bool:
+        brief = self._replica.brief
+        bases = () if brief is None else brief.bases
+        return any(f"base {base.id}" in note for base in bases)
 
     def choice(self, uav: str, choice: Choice, now_s: float) -> None:
         """Tell that a UAV turns aside; where reasons are wanted, of every choice."""

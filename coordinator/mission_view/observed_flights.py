@@ -108,6 +108,11 @@ class ObservedFlights:
 
     # -- what follows -------------------------------------------------------------------
 
+    def swaps(self, uav: str) -> int:
+        """How often that UAV has landed at a base for another battery."""
+        flight = self._flights.get(uav)
+        return 0 if flight is None else sum(claim.task is None for claim, _, _ in flight.visits)
+
     def executed_schedule(self, mission: Mission) -> dict[UavId, tuple[ScheduleEntry, ...]]:
         """Every UAV's list, as far as it is known."""
         tasks = {str(task.id): task for task in mission.tasks}

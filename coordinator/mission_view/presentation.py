@@ -26,6 +26,7 @@ class Signs:
     failed: str
     uav: str
     uav_lost: str
+    base: str
     bar_full: str
     bar_empty: str
     bar_mark: str
@@ -58,6 +59,7 @@ UNICODE = Signs(
     failed="×",
     uav="▲",
     uav_lost="▽",
+    base="⌂",
     bar_full="█",
     bar_empty="░",
     bar_mark="┃",
@@ -81,6 +83,7 @@ ASCII = Signs(
     failed="x",
     uav="^",
     uav_lost="!",
+    base="B",
     bar_full="#",
     bar_empty=".",
     bar_mark="|",

@@ -4,19 +4,20 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import deserted
-from coordinator.mission_view.results import lists_objective
+from coordinator.mission_view.results import lists_objective, still_left_out
 from coordinator.mission_view.uav_state import FleetStates, UavState, UavView
 from coordinator.mission_view.wording import short_names
 from swarm.model import Mission, TaskId, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskState
+from swarm.protocol.field_messages import ZoneEdit
 from swarm.protocol.messages import CommandKind, MissionPhase, OperatorCommand
-from swarm.protocol.operator_commands import in_force
+from swarm.protocol.operator_commands import in_force, zone_edits
 
 TAKEN = "taken"
 """How an open task stands that a UAV is on its way to, or serves."""
@@ -38,6 +39,8 @@ class TaskView:
     """Whether a UAV is on its way to it or serves it."""
     uav: int | None
     """Number of the UAV that has taken or done it."""
+    path_enu_m: tuple[tuple[float, float, float], ...] = ()
+    """Of a line, its points [m; mission origin]."""
 
     @property
     def stands(self) -> str:
@@ -75,11 +78,20 @@ class Scene:
     """The operator's newest word to each whom there was any, in this flight."""
     dropped: int
     """Messages that all agents together have dropped."""
+    zone_edits: tuple[ZoneEdit, ...] = ()
+    """The operator's newest word about each zone, in this flight."""
+    left_out: Mapping[TaskId, str] = field(default_factory=dict)
+    """Open tasks that the plan leaves out, and why."""
 
     @property
     def aborted(self) -> bool:
         """Whether the operator has ended the mission."""
         return any(command.kind is CommandKind.ABORT for command in self.commands)
+
+    @property
+    def has_sorties(self) -> bool:
+        """Whether some battery ends, so that UAVs land for another."""
+        return any(uav.endurance_s is not None for uav in self.mission.uavs)
 
     @property
     def dropped_by_reason(self) -> dict[str, int]:
@@ -148,6 +160,8 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
         others=tuple(sorted(mission_state.present - {COORDINATOR, *numbers})),
         commands=tuple(in_force(mission_state.replica).values()),
         dropped=sum(count.total() for count in mission_state.dropped.values()),
+        zone_edits=tuple(zone_edits(mission_state.replica).values()),
+        left_out={} if plan is None else still_left_out(plan, result.open),
     )
 
 
@@ -163,13 +177,21 @@ def _task_views(
     if not states:
         known = mission_state.mission.known_at_start().tasks
         return tuple(
-            TaskView(task.id, task.position_enu_m, TaskState.OPEN, taken=False, uav=None)
+            TaskView(
+                task.id,
+                task.position_enu_m,
+                TaskState.OPEN,
+                taken=False,
+                uav=None,
+                path_enu_m=task.path_enu_m,
+            )
             for task in known
         )
     views = []
     for task_id, state in states.items():
         holder = holders.get(task_id)
         uav = by.get(task_id) if holder is None else numbers.get(UavId(holder))
-        place = mission_state.replica.board[task_id].position_enu_m
-        views.append(TaskView(TaskId(task_id), place, state, holder is not None, uav))
+        entry = mission_state.replica.board[task_id]
+        place, path = entry.position_enu_m, entry.path_enu_m
+        views.append(TaskView(TaskId(task_id), place, state, holder is not None, uav, path))
     return tuple(views)

@@ -9,8 +9,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from coordinator.mission_view.mission_state import MissionState
-from swarm.model import TaskId, UavId
-from swarm.protocol.uav_messages import Claim, ClaimPhase, Status, StatusPhase
+from swarm.model import BaseId, TaskId, UavId
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, Status, StatusPhase
 
 Point = tuple[float, float, float]
 LOST = "lost"
@@ -22,6 +22,13 @@ _UNREADY = (STARTING, StatusPhase.LEARNING, StatusPhase.PREPARING)
 _BUSY = (StatusPhase.FLYING, StatusPhase.SERVING)
 _GONE_FOR_GOOD = (LOST, StatusPhase.RETURNING, StatusPhase.HOME, StatusPhase.OUT)
 """What is no less true of a UAV that nothing is heard of any more."""
+_VISITS = {
+    BaseStage.APPROACHING: "to base",
+    BaseStage.WAITING: "waiting",
+    BaseStage.LANDED: "swapping",
+    BaseStage.PARKED: "parked",
+}
+"""What a UAV does on a visit to a base, in a word."""
 _PHASES = {ClaimPhase.OUT: StatusPhase.OUT, ClaimPhase.PAUSED: StatusPhase.HOLDING}
 """What a UAV does that claims nothing, where it is not idle."""
 
@@ -53,6 +60,30 @@ class UavState:
     """The same where it is there, and that is long."""
     dropped: Mapping[str, int]
     """Messages its agents have dropped in all their lives, by reason."""
+    base: BaseId | None
+    """To which it flies, or where it stands, as it was last known."""
+    stage: BaseStage | None
+    """How far that visit is."""
+    sortie_left_s: float | None
+    """For how long it may fly on, its reserve kept [s of mission]; None: endless, not told, or on
+    the ground."""
+    swaps: int
+    """How often it has landed for another battery."""
+
+    @property
+    def visit(self) -> str | None:
+        """What it does about a base, in a word; None if nothing."""
+        if self.stage is None or self.troubled or not self.there:
+            return None
+        changing = self.claim in (ClaimPhase.PROPOSED, ClaimPhase.HELD) and self.task is None
+        if self.stage is BaseStage.LANDED and not changing:
+            return "at base"  # its battery is full
+        return _VISITS[self.stage]
+
+    @property
+    def goal(self) -> str | None:
+        """The task or base that it has taken."""
+        return self.task or self.base
 
     @property
     def now_does(self) -> str:
@@ -138,9 +169,12 @@ class FleetStates:
         status, claim = mission_state.statuses.get(uav), mission_state.replica.claims.get(uav)
         heard_s = mission_state.heard_s.get(uav)
         does, task = _activity(mission_state, uav, status, claim)
-        eta_s = None
-        if claim is not None and task is not None and self._mission_s is not None:
-            eta_s = claim.completion_s - self._mission_s
+        eta_s = left_s = None
+        if claim is not None and self._mission_s is not None:
+            if task is not None or (claim.base is not None and claim.is_taken):
+                eta_s = claim.completion_s - self._mission_s
+            if claim.sortie_end_s is not None:
+                left_s = max(0.0, claim.sortie_end_s - self._mission_s)
         return UavState(
             id=UavId(uav),
             does=does,
@@ -156,6 +190,10 @@ class FleetStates:
             link_age_s=None if heard_s is None else self._now_s - heard_s,
             silent_s=mission_state.silent_s(uav, self._now_s),
             dropped=self._dropped.get(uav, {}),
+            base=None if claim is None or claim.base is None else BaseId(claim.base),
+            stage=None if claim is None else claim.stage,
+            sortie_left_s=left_s,
+            swaps=mission_state.flights.swaps(uav),
         )
 
 
@@ -171,6 +209,6 @@ def _activity(
         does = StatusPhase.FLYING  # claims never lag, status may
     elif claim is not None and does == STARTING:
         does = _PHASES.get(claim.phase, StatusPhase.IDLE)
-    elif task is None and does in _BUSY:
+    elif task is None and does in _BUSY and (claim is None or claim.base is None):
         does = StatusPhase.IDLE
     return does, task

@@ -5,8 +5,9 @@ One way to say each thing, for the story, the terminal, the dashboard and explan
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
+from swarm.model import TaskId
 from swarm.model.ids import FLEET
 from swarm.protocol.board import claim_strength
 from swarm.protocol.field_messages import ZoneEdit
@@ -99,6 +100,17 @@ def zone_in_words(edit: ZoneEdit) -> str:
         return f"operator takes zone {edit.zone.id} away{because(edit.reason)}"
     keeps = "keeps the fleet inside" if edit.zone.inclusive else "draws"
     return f"operator {keeps} zone {edit.zone.id}{because(edit.reason)}"
+
+
+def zone_said(edit: ZoneEdit) -> str:
+    """What holds of a zone since the operator's word, and why."""
+    how = "taken away" if edit.withdrawn else "drawn"
+    return f"zone {edit.zone.id} {how} by the operator{because(edit.reason)}"
+
+
+def left_out_in_words(left_out: Mapping[TaskId, str], at_most: int | None = None) -> str:
+    """Tasks that are left out, each with its reason; of more than ``at_most`` the first ones."""
+    return listed([f"{task} ({why})" for task, why in left_out.items()], at_most)
 
 
 _VISITED = {

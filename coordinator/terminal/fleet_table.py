@@ -15,7 +15,7 @@ from rich.text import Text
 from coordinator.mission_view.presentation import BAD, Signs, uav_colour
 from coordinator.mission_view.scene import Scene
 from coordinator.mission_view.uav_state import LOST, UavView
-from coordinator.mission_view.wording import clean, command_in_words
+from coordinator.mission_view.wording import clean, command_in_words, zone_said
 from swarm.model.ids import FLEET
 from swarm.protocol.messages import CommandKind, MissionPhase
 from swarm.protocol.uav_messages import StatusPhase
@@ -24,6 +24,8 @@ _DOES_CELLS = len(StatusPhase.PREPARING)
 _ETA_CELLS = 7
 _DONE_CELLS = 5
 _BATTERY_CELLS = 5
+_SORTIE_CELLS = 7
+_SWAPS_CELLS = 6
 _LONGEST_ID = 12
 _SHORTEST_NOTE = 10
 _GAP = 2
@@ -47,14 +49,18 @@ class _ColumnWidths:
     id: int
     task: int
     battery: bool
+    sorties: bool
+    """Whether batteries end, so that it matters how long they last and how often they are
+    changed."""
     eta_digits: int
 
     @property
     def total(self) -> int:
         """All columns, without room for notes."""
         battery = _BATTERY_CELLS if self.battery else 0
+        sorties = _SORTIE_CELLS + _SWAPS_CELLS if self.sorties else 0
         before_task = 2 + self.id + 1 + _DOES_CELLS + 1
-        return before_task + self.task + _ETA_CELLS + _DONE_CELLS + battery
+        return before_task + self.task + _ETA_CELLS + _DONE_CELLS + battery + sorties
 
 
 def table_width(scene: Scene) -> int:
@@ -130,11 +136,13 @@ def task_lists(scene: Scene, width: int, height: int, signs: Signs) -> list[Text
 
 def _columns(scene: Scene) -> _ColumnWidths:
     longest_id = max((len(uav.id) for uav in scene.uavs), default=3)
-    longest_task = max((len(task.id) for task in scene.mission.tasks), default=4)
+    goals = [*(task.id for task in scene.mission.tasks), *(b.id for b in scene.mission.bases)]
+    longest_task = max(map(len, goals), default=4)
     return _ColumnWidths(
         id=min(_LONGEST_ID, max(3, longest_id)),
         task=min(_LONGEST_ID, max(4, longest_task)),
         battery=any(uav.battery_frac is not None for uav in scene.uavs),
+        sorties=scene.has_sorties,
         eta_digits=2 if scene.mission.horizon_s < 100.0 else 0,
     )
 
@@ -144,6 +152,8 @@ def _heading(columns: _ColumnWidths, width: int, signs: Signs) -> Text:
     text += f"{'ETA':>{_ETA_CELLS}}{'done':>{_DONE_CELLS}}"
     if columns.battery:
         text += f"{'batt':>{_BATTERY_CELLS}}"
+    if columns.sorties:
+        text += f"{'left':>{_SORTIE_CELLS}}{'swaps':>{_SWAPS_CELLS}}"
     return Text(fit_cells(text, width, signs), "dim")
 
 
@@ -151,7 +161,7 @@ def _row(uav: UavView, columns: _ColumnWidths, width: int, signs: Signs) -> Text
     sign = signs.uav_lost if uav.troubled else signs.uav
     colour = BAD if uav.troubled else f"bold {uav_colour(uav.number)}"
     row = Text().append(f"{sign} {fit_cells(uav.id, columns.id, signs)} ", colour)
-    does = uav.does.upper() if uav.troubled else uav.does
+    does = uav.does.upper() if uav.troubled else uav.visit or uav.does
     if uav.silent_s is not None and not uav.troubled:
         does = f"silent {uav.silent_s:.0f}s"
     bad = uav.troubled or uav.silent_s is not None
@@ -164,11 +174,14 @@ def _row(uav: UavView, columns: _ColumnWidths, width: int, signs: Signs) -> Text
     if note and (uav.unready or uav.does in (StatusPhase.OUT, StatusPhase.HOLDING)):
         row.append(fit_cells(note, width - row.cell_len, signs), "dim")
         return row
-    row.append(fit_cells(uav.task or signs.nothing, columns.task, signs), "" if uav.task else "dim")
+    row.append(fit_cells(uav.goal or signs.nothing, columns.task, signs), "" if uav.goal else "dim")
     row.append(f"{_eta(uav, columns.eta_digits):>{_ETA_CELLS}}{len(uav.flown):>{_DONE_CELLS}}")
     if columns.battery:
         charge = "" if uav.battery_frac is None else f"{100.0 * uav.battery_frac:.0f}%"
         row.append(f"{charge:>{_BATTERY_CELLS}}", BAD if uav.battery_low else "")
+    if columns.sorties:
+        left = "" if uav.sortie_left_s is None else f"{uav.sortie_left_s:.0f} s"
+        row.append(f"{left:>{_SORTIE_CELLS}}{uav.swaps:>{_SWAPS_CELLS}}")
     room = width - row.cell_len - _GAP
     if note and room >= _SHORTEST_NOTE:
         row.append(" " * _GAP + fit_cells(note, room, signs), "dim")
@@ -249,4 +262,5 @@ def _said(scene: Scene) -> list[str]:
     """What the operator has said that is still in force, the abort first."""
     lasting = [command for command in scene.commands if command.kind is not CommandKind.RESUME]
     ordered = sorted(lasting, key=lambda command: command.target != FLEET)
-    return [command_in_words(command) for command in ordered]
+    drawn = [zone_said(edit) for edit in scene.zone_edits]
+    return [*(command_in_words(command) for command in ordered), *drawn]

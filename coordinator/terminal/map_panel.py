@@ -122,6 +122,8 @@ _ROOM_PER_LETTER = 6
 """Cells per task and letter of its name from which on tasks are named."""
 
 
+_ZONE = "red"
+"""Style of the borders of zones."""
 Point = tuple[float, float, float]
 
 
@@ -140,7 +142,10 @@ def map_panel(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]
     canvas = Canvas(columns, rows, braille=signs.braille)
     view = _View(scene, columns, rows)
     room = columns * rows / max(1, len(scene.tasks))
+    _draw_zones(canvas, view, scene)
     _draw_paths(canvas, view, scene, room)
+    for base in scene.mission.bases:
+        canvas.put(view.spot(base.position_enu_m), signs.base, "bold")
     tasks = [task for task in scene.tasks if task.state is not TaskState.WITHDRAWN]
     for task in sorted(tasks, key=_weight):
         canvas.put(view.spot(task.position_enu_m), *_task_look(task, signs))
@@ -154,6 +159,8 @@ def map_panel(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]
     if room >= _ROOM_PER_LETTER * (longest + 2):
         for task in tasks:
             canvas.name(view.spot(task.position_enu_m), (task.id,), "dim")
+        for base in scene.mission.bases:
+            canvas.name(view.spot(base.position_enu_m), (base.id,), "dim")
     return _framed(canvas.lines(), columns, view.m_per_column, signs)
 
 
@@ -176,16 +183,27 @@ class _View:
 
     def spot(self, point_enu_m: Point) -> Spot:
         """Its cell; what lies outside the map is drawn at its edge."""
-        column = self._left + (point_enu_m[0] - self._west_m) / self.m_per_column
-        row = self._top + (self._north_m - point_enu_m[1]) / self.m_per_column / _CELL_ASPECT
+        column, row = self.beyond((point_enu_m[0], point_enu_m[1]))
         return min(max(column, 0.0), self._right_most), min(max(row, 0.0), self._lowest)
+
+    def beyond(self, point_enu_m: tuple[float, float]) -> Spot:
+        """Its cell, be it outside the map."""
+        column = self._left + (point_enu_m[0] - self._west_m) / self.m_per_column
+        return column, self._top + (self._north_m - point_enu_m[1]) / self.m_per_column / (
+            _CELL_ASPECT
+        )
 
 
 def _points_m(scene: Scene) -> list[tuple[float, float]]:
-    """All starts and tasks, also those nobody knows yet: the map must not jump."""
+    """All starts, bases and tasks, also those nobody knows yet: the map must not jump."""
     starts = [uav.position_enu_m[:2] for uav in scene.mission.uavs]
-    tasks = [task.position_enu_m[:2] for task in scene.mission.tasks]
-    return [*starts, *tasks] or [(0.0, 0.0)]
+    bases = [base.position_enu_m[:2] for base in scene.mission.bases]
+    tasks = [
+        point[:2]
+        for task in scene.mission.tasks
+        for point in task.path_enu_m or (task.position_enu_m,)
+    ]
+    return [*starts, *bases, *tasks] or [(0.0, 0.0)]
 
 
 def _extent_m(scene: Scene) -> tuple[float, float]:
@@ -193,8 +211,19 @@ def _extent_m(scene: Scene) -> tuple[float, float]:
     return max(east_m) - min(east_m), max(north_m) - min(north_m)
 
 
+def _draw_zones(canvas: Canvas, view: _View, scene: Scene) -> None:
+    """Borders of zones; what of them lies outside the map is left out."""
+    for zone in scene.mission.zones:
+        for ring in (zone.polygon_enu_m, *zone.holes_enu_m):
+            for first, last in pairwise((*ring, ring[0])):
+                canvas.line(view.beyond(first), view.beyond(last), _ZONE)
+
+
 def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
     places = {task.id: task.position_enu_m for task in scene.tasks}
+    for task in scene.tasks:
+        for first, last in pairwise(task.path_enu_m):
+            canvas.line(view.spot(first), view.spot(last), "dim", every=3)
     for uav in scene.uavs:
         if room < _ROOM_FOR_PLANS or uav.troubled:
             continue

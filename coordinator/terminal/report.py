@@ -25,10 +25,11 @@ from coordinator.mission_view.results import (
     compare_quantities,
     compare_routes,
     deviations,
+    still_left_out,
     summary_line,
 )
 from coordinator.mission_view.story import MissionEvent, notable
-from coordinator.mission_view.wording import clean, shown_s, shown_value
+from coordinator.mission_view.wording import clean, counted, shown_s, shown_value
 from coordinator.planner.plan_report import plan_as_json, schedule_as_json
 from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.model.plan import Schedule
@@ -169,6 +170,7 @@ class MissionReport:
         if self.value is not None and not math.isclose(self.value, self.result.executed_objective):
             text = f"{shown_value(self.value)} value·s: m·(D − t) of each success, failures nothing"
             found.append(ReportFact("by outcomes", text))
+        found += self._of_field()
         spent = []
         if self.takeoff_s is not None:
             spent.append(f"take-off {shown_s(self.takeoff_s)} s")
@@ -180,6 +182,25 @@ class MissionReport:
         if self.security is not None:
             found.append(self.security.fact)
         found += [ReportFact("process", clean(fate), bad=True) for fate in self.fates]
+        return found
+
+    def _of_field(self) -> list[ReportFact]:
+        """What the plan left out and was not done after all; batteries that were changed."""
+        found = []
+        if self.plan is not None and (left := still_left_out(self.plan, self.result.open)):
+            ids = tuple(f"{task} ({why})" for task, why in left.items())
+            found.append(ReportFact("left out", "by the plan", ids))
+        swaps = {
+            # The last entry may be a way home, where nothing is changed.
+            uav: sum(
+                e.base is not None and (e is not entries[-1] or e.end_s > e.begin_s)
+                for e in entries
+            )
+            for uav, entries in self.executed_schedule.items()
+        }
+        if total := sum(swaps.values()):
+            by = tuple(f"{uav} {count}" for uav, count in swaps.items() if count)
+            found.append(ReportFact("batteries", f"changed {counted(total, 'time')}", by))
         return found
 
     def _lines(self) -> list[str]:

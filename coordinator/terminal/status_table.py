@@ -11,9 +11,21 @@ from rich.text import Text
 from coordinator.mission_view.presentation import BAD, Signs, uav_colour
 from coordinator.mission_view.scene import TAKEN, Scene
 from coordinator.mission_view.uav_state import ABSENT, LOST, UavView
-from coordinator.mission_view.wording import clean, command_in_words, shown_value
+from coordinator.mission_view.wording import (
+    because,
+    clean,
+    command_in_words,
+    counted,
+    left_out_in_words,
+    listed,
+    shown_value,
+    zone_said,
+)
 from coordinator.terminal.live_view import mission_title, task_counts
 from swarm.protocol.board import TaskState
+
+_MOST_LEFT_OUT = 8
+"""Tasks named that are left out."""
 
 
 def status_as_json(scene: Scene) -> dict[str, Any]:
@@ -30,6 +42,13 @@ def status_as_json(scene: Scene) -> dict[str, Any]:
         "horizon_s": scene.mission.horizon_s,
         "objective": scene.objective,
         "planned_objective": scene.planned_objective,
+        "left_out": dict(scene.left_out),
+        "zones": [zone.id for zone in scene.mission.zones],
+        "bases": [base.id for base in scene.mission.bases],
+        "zone_edits": {
+            edit.zone.id: {"withdrawn": edit.withdrawn, "reason": edit.reason}
+            for edit in scene.zone_edits
+        },
         "tasks": tasks
         | {TaskState.OPEN: tasks[TaskState.OPEN] + scene.counts[TAKEN], TAKEN: scene.counts[TAKEN]},
         "link": scene.cut_s is None,
@@ -54,6 +73,10 @@ def _uav_as_json(uav: UavView) -> dict[str, Any]:
         "done": len(uav.flown),
         "position_enu_m": uav.in_layer_enu_m,
         "battery_frac": uav.battery_frac,
+        "base": uav.base,
+        "stage": uav.stage,
+        "sortie_left_s": uav.sortie_left_s,
+        "swaps": uav.swaps,
         "link_age_s": uav.link_age_s,
         "note": uav.note,
         "dropped": dict(uav.dropped),
@@ -73,8 +96,16 @@ def status_table(scene: Scene, width: int, signs: Signs) -> RenderableType:
     facts.add_row("coordinator", there)
     if scene.others:
         facts.add_row("also there", _line(", ".join(scene.others), signs))
+    if scene.left_out:
+        facts.add_row("left out", _line(left_out_in_words(scene.left_out, _MOST_LEFT_OUT), signs))
+    if scene.mission.zones:
+        facts.add_row("zones", _line(listed([z.id for z in scene.mission.zones]), signs))
+    if scene.mission.bases:
+        facts.add_row("bases", _bases(scene, signs))
     for command in scene.commands:
         facts.add_row("operator", _line(command_in_words(command), signs))
+    for edit in scene.zone_edits:
+        facts.add_row("operator", _line(zone_said(edit), signs))
     parts: list[RenderableType] = [mission_title(scene, width, 1.0, signs), facts, ""]
     parts.append(_fleet(scene, signs))
     if scene.dropped_by_reason:
@@ -90,27 +121,44 @@ def _fleet(scene: Scene, signs: Signs) -> Table:
     table.add_column("done", justify="right")
     table.add_column("place [m]", justify="right", no_wrap=True)
     table.add_column("batt", justify="right")
+    if scene.has_sorties:
+        table.add_column("left", justify="right", no_wrap=True)
+        table.add_column("swaps", justify="right")
     table.add_column("heard", justify="right", no_wrap=True)
     table.add_column("dropped", justify="right")
     table.add_column("note")
     for uav in scene.uavs:
         gone = uav.now_does in (LOST, ABSENT)
         colour = BAD if gone else f"bold {uav_colour(uav.number)}"
+        goal = uav.goal if uav.there else None
+        left = "" if uav.sortie_left_s is None else f"{uav.sortie_left_s:.0f} s"
+        sorties = (left, str(uav.swaps)) if scene.has_sorties else ()
         table.add_row(
             Text(f"{signs.uav_lost if gone else signs.uav} {uav.id}", colour),
-            Text(uav.now_does.upper() if gone else uav.now_does, BAD if gone else ""),
-            uav.now_task or Text(signs.nothing, "dim"),
+            Text(uav.now_does.upper() if gone else uav.visit or uav.now_does, BAD if gone else ""),
+            goal or Text(signs.nothing, "dim"),
             str(len(uav.flown)),
             _place(uav.in_layer_enu_m, signs),
             Text(
                 "" if uav.battery_frac is None else f"{uav.battery_frac:.0%}",
                 BAD if uav.battery_low else "",
             ),
+            *sorties,
             signs.nothing if uav.link_age_s is None else f"{uav.link_age_s:.1f} s",
             str(sum(uav.dropped.values())),
             _line(uav.note, signs),
         )
     return table
+
+
+def _bases(scene: Scene, signs: Signs) -> Text:
+    """Every base, with who stands there or is on the way."""
+    parts = []
+    for base in scene.mission.bases:
+        who = [f"{uav.id} {uav.visit}" for uav in scene.uavs if uav.base == base.id and uav.visit]
+        slots = "" if base.slots is None else f" ({counted(base.slots, 'slot')})"
+        parts.append(f"{base.id}{slots}{because(', '.join(who))}")
+    return _line("; ".join(parts), signs)
 
 
 def _dropped(scene: Scene, signs: Signs) -> Table:

@@ -261,7 +261,7 @@ def run(
     import os
 
     from coordinator.dashboard.access import parse_serve_address
-    from sim.fleet.autopilots import check_speedup, parse_autopilots
+    from sim.fleet.autopilots import RunningVehicles, check_speedup, parse_autopilots
     from sim.fleet.firmware import SitlFirmware
     from sim.fleet.layout import LaunchOptions, defaults_for
     from sim.fleet.passthrough import (
@@ -290,6 +290,7 @@ def run(
         without_bus_s=without_bus_s,
         # Firmware that is started here flies in a simulator, with parameters of its own.
         accept_no_failsafe=accept_no_failsafe or isinstance(autopilots, SitlFirmware),
+        ready_by_itself=not isinstance(autopilots, RunningVehicles),
         faults=tuple(fault or ()),
     )
     check_passthrough(passthrough, autopilots, uavs)

@@ -77,6 +77,8 @@ class PassthroughOptions:
     fence: Fence | None = None
     without_bus_s: float | None = None
     accept_no_failsafe: bool = False
+    ready_by_itself: bool = False
+    """Nobody stands beside the vehicles who could let them start again after a swap."""
     faults: tuple[str, ...] = ()
     """Each ``UAV:KIND@T+DURATION``."""
 
@@ -91,6 +93,7 @@ class PassthroughOptions:
             *([] if self.fence is None else self.fence.to_agent()),
             *_given("--without-bus-s", self.without_bus_s),
             *(["--accept-no-failsafe"] if self.accept_no_failsafe else []),
+            *(["--ready-by-itself"] if self.ready_by_itself else []),
             *([] if key is None else ["--signing-key", str(signing_key_of(uav, key))]),
         ]
 

@@ -138,7 +138,7 @@ def _zones(mission: Mission, problem: FieldProblem) -> Iterator[CheckFinding]:
 def _tasks(mission: Mission, problem: FieldProblem) -> Iterator[CheckFinding]:
     """Whether somebody could do each task as its only one."""
     alone_s = earliest_alone(problem.kernel, FieldState.at_start(problem))
-    can = np.isfinite(alone_s).any(axis=0)
+    can: list[bool] = np.isfinite(alone_s).any(axis=0).tolist()
     hopeless = [task for task, able in zip(mission.tasks, can, strict=True) if not able]
     if hopeless:
         text = f"nobody can do {_named(task.id for task in hopeless)}, not even as the only task"

@@ -1,0 +1,74 @@
+"""What the doctor says of batteries, bases, zones and tasks."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from sim.fleet.doctor.field import check_field
+from sim.fleet.doctor.finding import CheckFinding, CheckState
+from swarm.model import Base, BaseId, Mission, Zone, ZoneId
+from tests.support.builders import mission, task, uav
+
+AROUND = Zone(ZoneId("moat"), ((-20.0, -20.0), (20.0, -20.0), (20.0, 20.0), (-20.0, 20.0)))
+
+
+def fleet(endurance_s: float | None = 100.0, charge_frac: float = 1.0) -> Mission:
+    """One UAV at the origin, two tasks 20 m and 30 m away, a base between."""
+    uavs = [replace(uav("u0"), endurance_s=endurance_s, charge_frac=charge_frac)]
+    flown = mission(uavs, [task("near", 20.0), task("far", 30.0)])
+    return replace(flown, bases=(Base(BaseId("b0"), (10.0, 0.0, 0.0)),))
+
+
+def said(flown: Mission) -> dict[str, CheckFinding]:
+    return {each.check: each for each in check_field(flown)}
+
+
+def test_of_a_plain_mission_nothing_is_said() -> None:
+    assert check_field(mission([uav("u0")], [task("t0", 5.0)])) == []
+
+
+def test_a_mission_that_can_be_flown_is_fine() -> None:
+    found = said(fleet())
+
+    assert {each.state for each in found.values()} == {CheckState.OK}
+    assert found["energy"].text == "u0 has the least: 80 s of flight, 80 s on a full battery"
+    assert found["bases"].text == "b0 (any number at a time, 0 s)"
+
+
+def test_a_battery_without_charge_to_fly_with_fails_and_one_with_little_is_a_warning() -> None:
+    empty, little = said(fleet(charge_frac=0.2)), said(fleet(charge_frac=0.5))
+
+    assert empty["energy"].state is CheckState.FAILS
+    assert empty["energy"].text.startswith("u0 may not fly at all")
+    assert little["energy"].state is CheckState.WARNING
+
+
+def test_a_base_that_nobody_reaches_and_batteries_without_any_base_are_told() -> None:
+    distant = replace(fleet(), bases=(Base(BaseId("b0"), (500.0, 0.0, 0.0)),))
+    none = replace(fleet(), bases=())
+
+    assert "nobody gets to b0" in " ".join(each.text for each in check_field(distant))
+    assert "lands for good" in said(none)["bases"].text
+    assert said(replace(fleet(None), bases=(), zones=(replace(AROUND, floor_m=90.0),))).keys() == {
+        "zones",
+        "tasks",
+    }
+
+
+def test_zones_that_shut_a_start_in_fail_and_those_that_concern_nobody_are_told() -> None:
+    ring = replace(AROUND, holes_enu_m=(((-5.0, -5.0), (5.0, -5.0), (5.0, 5.0), (-5.0, 5.0)),))
+    shut, high = said(replace(fleet(), zones=(ring,))), replace(AROUND, floor_m=90.0)
+
+    assert shut["zones"].state is CheckState.FAILS
+    assert shut["tasks"].text.startswith("nobody can do near, far")
+    assert "as high, or as low, as moat" in said(replace(fleet(), zones=(high,)))["zones"].text
+
+
+def test_a_task_that_nobody_can_do_is_named() -> None:
+    flown = fleet()
+    late = replace(flown.tasks[1], closes_s=3.0)
+
+    found = said(replace(flown, tasks=(flown.tasks[0], late)))["tasks"]
+
+    assert found.state is CheckState.WARNING
+    assert found.text == "nobody can do far, not even as the only task"
