@@ -8,18 +8,19 @@ does not want waited for not at all. Who gets ready later joins the mission that
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 
 from coordinator.planner.online import EpochPolicy, ReplanResult, Situation
-from swarm.model import Mission, Plan, UavId
-from swarm.protocol.board import TaskBoard, TaskState, doable, mission_of
+from swarm.model import Mission, Plan, Uav, UavId
+from swarm.model.layers import FlightLayers
+from swarm.protocol.board import TaskBoard, TaskState, doable, is_of_field, mission_of
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
 from swarm.protocol.field_board import doable_in_field
 from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.membership import Membership
-from swarm.protocol.messages import MissionPhase, PlanEpoch
+from swarm.protocol.messages import MissionConfig, MissionPhase, PlanEpoch
 from swarm.protocol.operator_commands import dispensable, zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing, earliest
@@ -284,9 +285,21 @@ class StartGate:
             return []
         mission = mission_of(self._replica, self._mission.name, brief)
         fleet = tuple(uav for uav in mission.uavs if uav.id in uavs)
+        if is_of_field(mission):
+            fleet = _in_layers(fleet, brief)
         tasks = tuple(task for task in mission.tasks if task.id in self._planned_tasks)
         mission = replace(mission, uavs=fleet, tasks=tasks, origin=self._mission.origin)
         return [MakePlan(self._request, mission, self._method, self._seed)]
+
+
+def _in_layers(fleet: Sequence[Uav], brief: MissionConfig) -> tuple[Uav, ...]:
+    """``fleet`` with its layers of the brief, where a planner would take it to fly in others."""
+    told_m = {uav.id: uav.layer_m for uav in brief.uavs}
+    usual = FlightLayers()
+    return tuple(
+        uav if told_m[uav.id] == usual.layer_m(row) else replace(uav, layer_m=told_m[uav.id])
+        for row, uav in enumerate(fleet)
+    )
 
 
 ALL_ENDED = "every task has ended"

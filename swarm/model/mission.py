@@ -45,6 +45,9 @@ class Uav:
     """Share of the endurance that is never planned with; within 0..1."""
     charge_frac: float = 1.0
     """Charge of the battery at mission time 0; within 0..1."""
+    layer_m: float | None = None
+    """Height of its layer above the places it visits [m]; None: by its place in the mission. No
+    file names one: a fleet that is briefed already has it from its coordinator."""
 
     def __post_init__(self) -> None:
         require_id(self.id, "UAV id")

@@ -43,8 +43,8 @@ class FieldNetwork:
         mission: gives bases, zones with their margin, wind and band.
         uavs: rows.
         tasks: columns.
-        layers_m: (n_uav,) heights of the UAVs' layers [m]; when None, as a coordinator flies them
-            by default, by their places in the mission, else in ``uavs``.
+        layers_m: (n_uav,) heights of the UAVs' layers [m]; when None, their own, or as a
+            coordinator flies them by default, by their places in the mission, else in ``uavs``.
 
     Raises:
         ValueError: there is not one layer for each UAV.
@@ -226,7 +226,10 @@ class FieldNetwork:
 def _layers_m(mission: Mission, uavs: Sequence[Uav]) -> list[float]:
     layers = FlightLayers()
     places = {uav.id: index for index, uav in enumerate(mission.uavs)}
-    return [layers.layer_m(places.get(uav.id, row)) for row, uav in enumerate(uavs)]
+    return [
+        layers.layer_m(places.get(uav.id, row)) if uav.layer_m is None else uav.layer_m
+        for row, uav in enumerate(uavs)
+    ]
 
 
 def _nodes(

@@ -151,8 +151,8 @@ class FieldProblem:
         Args:
             mission: gives all that is not named below. Who plans for mission time 0 passes
                 `Mission.known_at_start`, without pop-ups.
-            layers_m: (n_uav,) heights of the UAVs' layers [m]; when None, as a coordinator flies
-                them by default, by the UAVs' places in the mission.
+            layers_m: (n_uav,) heights of the UAVs' layers [m]; when None, their own, or
+                as a coordinator flies them by default, by the UAVs' places in the mission.
             uavs: rows in this order; the mission's own when None.
             tasks: columns in this order; the mission's own when None.
         """

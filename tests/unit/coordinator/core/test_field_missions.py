@@ -15,6 +15,7 @@ from coordinator.core.publication import (
     unsayable,
 )
 from sim.world.settings import planned_anew
+from swarm.allocation.field import FieldProblem
 from swarm.model import Base, BaseId, Mission, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.board import TaskBoard, is_of_field, mission_of
@@ -105,6 +106,22 @@ def test_a_plain_mission_says_not_a_byte_more_than_before() -> None:
     for body in bodies:
         assert encode(message(COORDINATOR, body))[:2] == b"\x97\x01"
     assert brief_of(flown).bases == ()
+
+
+def test_who_flies_is_planned_for_in_the_layers_of_the_brief_though_others_are_missing() -> None:
+    """A zone that ends between both layers: the second UAV flies over it, whoever is there."""
+    low = replace(ZONE.zone(), ceiling_m=11.0)
+    flown = replace(mission((U0, U1), (task("t0", 50.0),)), zones=(low,), schema=2)
+    fleet = LoneCoordinator(flown)
+    fleet.see("u0", "u1")
+    fleet.leave("u0")
+
+    wanted = plans_wanted(fleet.ready("u1"))[-1].mission
+    flies = TaskBoard(fleet.core.replica, flown.name).field_problem
+    assert flies is not None
+    assert [uav.id for uav in wanted.uavs] == ["u1"]
+    planned = FieldProblem.from_mission(wanted)
+    assert planned.leg_s[0, 0, -1] == flies.leg_s[flies.kind[1], 1, -1]
 
 
 def test_what_no_message_has_room_for_is_named_before_anybody_waits_for_it() -> None:
