@@ -7,6 +7,7 @@ a base, and what comes after it (agent.core.field_tasking).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -23,6 +24,10 @@ from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
 
 _ON_GROUND = (BaseStage.LANDED, BaseStage.PARKED)
+_PUNCTUAL = 0.25
+"""Share of an objection window by which who is punctual may arrive earlier or later than it said.
+
+Who has waited for a whole window was there before somebody who comes now, even if both are off."""
 
 
 @dataclass(slots=True)
@@ -35,6 +40,10 @@ class BaseVisit:
     """When it has waited for as long as others may object."""
     waited: bool = False
     """Whether it has."""
+    known_at_s: float = math.inf
+    """Since when everybody has known when it is going to arrive."""
+    punctual: bool = False
+    """Whether it has arrived then."""
     hopeless_at_s: float | None = None
     """When it has stood beside slots for long enough that are all blocked."""
 
@@ -148,7 +157,8 @@ class BaseVisits(AgentPart):
     ) -> None:
         """Fly to ``base`` that way, and claim it: free since then, predicted to be ready then."""
         self._machine.take(Trigger.BASE_CHOSEN)
-        self._visit = BaseVisit(held_at_s=now_s + self._timing.objection_window_s)
+        known_s = now_s + self._timing.objection_window_s
+        self._visit = BaseVisit(held_at_s=known_s, known_at_s=known_s)
         self._fly(way, base)
         self._say(
             Claim(
@@ -191,6 +201,7 @@ class BaseVisits(AgentPart):
             later_s = max(0.0, arrives_s - (claim.arrives_s or arrives_s))
             self._fly(way, claim.base)
             ready_s = claim.completion_s + later_s
+            self._visit.known_at_s = now_s + self._timing.objection_window_s
             self._say(replace(claim, completion_s=ready_s, arrives_s=arrives_s))
 
     def arrive(self, now_s: float) -> None:
@@ -200,7 +211,14 @@ class BaseVisits(AgentPart):
             return
         self._mission_view.arrive(base.position_enu_m)
         if claim.stage is not BaseStage.WAITING:  # an earlier life of it may have waited already
-            self._say(replace(claim, arrives_s=self._mission_view.mission_s(now_s)))
+            mission_s = self._mission_view.mission_s(now_s)
+            off_s = math.inf if claim.arrives_s is None else abs(mission_s - claim.arrives_s)
+            self._visit.punctual = (
+                self._visit.known_at_s <= now_s
+                and off_s <= _PUNCTUAL * self._timing.objection_window_s
+            )
+            if not self._visit.punctual:  # its place in the order is not what others know it to be
+                self._say(replace(claim, arrives_s=mission_s))
         else:
             self._visit.waited_at_s = now_s + self._timing.objection_window_s
         self._land_or_wait(base, now_s)
@@ -256,7 +274,9 @@ class BaseVisits(AgentPart):
         claims = {uav: each for uav, each in self._replica.claims.items() if uav in credible}
         claims[self._uav] = claim
         everybody = claims, self.blocking()
-        if bases.may_land(self._uav, base.id, base.slots, *everybody, waited=visit.waited):
+        patient = {"waited": visit.waited, "punctual": visit.punctual}
+        here = self._uav, base.id, base.slots
+        if bases.may_land(*here, *everybody, **patient, swap_s=base.swap_s):
             self._land(base, claim, now_s)
         elif claim.stage is BaseStage.APPROACHING and claim.phase is ClaimPhase.HELD:
             visit.waited_at_s = now_s + self._timing.objection_window_s

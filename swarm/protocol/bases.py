@@ -59,12 +59,17 @@ def may_land(
     blocking: Mapping[str, str],
     *,
     waited: bool,
+    punctual: bool = False,
+    swap_s: float = 0.0,
 ) -> bool:
     """Whether ``uav``, which is above ``base`` or beside its slots, may take one of them now.
 
-    At once when its claim is held and everybody who claims the base finds a slot; else when it has
-    waited and fewer than there are slots stand there or wait in front of it. Who waits on the
-    ground lets everybody in the air go first: time costs it nothing.
+    At once when its claim is held and everybody who claims the base finds a slot, or, if it has
+    come when it said it would, everybody who is there or said that it would come earlier: their
+    words are as old as its own, so all know the same order. Else when it has waited and fewer than
+    there are slots stand there or wait in front of it. Who waits on the ground lets those in the
+    air go first, as time costs it nothing, but not for ever: only who arrives within the time of a
+    swap after it.
 
     Args:
         uav: who asks; its own claim is among ``claims``.
@@ -73,34 +78,45 @@ def may_land(
         claims: its own and those of credible others.
         blocking: of the lost, see `blocking`; lost ones that were on their way block nothing.
         waited: whether it has said that it waits, an objection window ago or more.
+        punctual: whether it has arrived when it has said since an objection window ago or more.
+        swap_s: how long a swap takes there [s].
     """
     own = claims.get(uav)
     if slots is None:
         return True
     if own is None or own.base != base:
         return False
-    others = {
-        other: claim
-        for other, claim in claims.items()
-        if other != uav and claim.base == base and claim.stage is not BaseStage.PARKED
-    }
+    there = {other: claim for other, claim in claims.items() if other != uav and claim.base == base}
+    flying = {o: claim for o, claim in there.items() if claim.stage is not BaseStage.PARKED}
     stands = {other for other, where in blocking.items() if where == base and other != uav}
     place = arrival_order(uav, own)
     if own.stage is BaseStage.PARKED:
         ahead = {
             other
-            for other, claim in claims.items()
-            if claim.base == base and wants_slot(claim) and arrival_order(other, claim) < place
+            for other, claim in there.items()
+            if (wants_slot(claim) and arrival_order(other, claim) < place)
+            or (other in flying and (holds_slot(claim) or not _lets_pass(claim, own, swap_s)))
         }
-        return waited and len(others.keys() | stands | ahead) < slots
-    if own.phase is ClaimPhase.HELD and len(others.keys() | stands) < slots:
-        return True
-    if not waited:
-        return False
-    before = {
+        return waited and len(stands | ahead) < slots
+    overdue = {
         other
-        for other, claim in others.items()
-        if holds_slot(claim)
-        or (claim.stage is BaseStage.WAITING and arrival_order(other, claim) < place)
+        for other, claim in there.items()
+        if wants_slot(claim) and _lets_pass(own, claim, swap_s)
     }
-    return len(before | stands) < slots
+    taken = stands | overdue
+    held = own.phase is ClaimPhase.HELD
+    if held and len(flying.keys() | taken) < slots:
+        return True
+    earlier = {other for other, claim in flying.items() if arrival_order(other, claim) < place}
+    holding = {other for other, claim in flying.items() if holds_slot(claim)}
+    if held and punctual and len(holding | earlier | taken) < slots:
+        return True
+    waiting = {other for other in earlier if flying[other].stage is BaseStage.WAITING}
+    return waited and len(holding | waiting | taken) < slots
+
+
+def _lets_pass(flying: Claim, parked: Claim, swap_s: float) -> bool:
+    """Whether who is in the air comes so late that it lets who waits on the ground go first."""
+    if flying.arrives_s is None or parked.arrives_s is None:
+        return False
+    return flying.arrives_s > parked.arrives_s + swap_s

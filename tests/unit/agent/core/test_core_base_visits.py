@@ -270,10 +270,73 @@ def test_without_a_slot_it_lands_beside_them_and_swaps_from_there_when_one_is_fr
 def test_who_waits_on_the_ground_lets_those_in_the_air_go_first(script: Script) -> None:
     agent = beside_slots(script)
 
-    agent.hear("u1", visiting(BaseStage.APPROACHING, 900.0), BUDGET_S + 51.0)
+    agent.hear("u1", visiting(BaseStage.APPROACHING, 50.0 + SWAP_S), BUDGET_S + 51.0)
     agent.run_until(BUDGET_S + 60.0)
     assert agent.state() is AgentState.BESIDE_SLOTS
     agent.hear("u1", replace(visiting(BaseStage.PARKED, 900.0), sortie_end_s=910.0), 910.0)
+    assert agent.state() is AgentState.SWAPPING
+
+
+def test_who_waits_on_the_ground_lets_nobody_pass_who_comes_a_swap_later(script: Script) -> None:
+    """Else it would starve where others come again and again."""
+    agent = beside_slots(script)
+
+    agent.hear("u1", visiting(BaseStage.WAITING, 51.0 + SWAP_S), BUDGET_S + 51.0)
+
+    assert agent.state() is AgentState.SWAPPING
+
+
+def test_who_is_in_the_air_lets_those_pass_who_have_waited_on_the_ground_for_a_swap(
+    script: Script,
+) -> None:
+    agent = on_its_way(script, "u1")
+    parked = replace(visiting(BaseStage.PARKED, 49.0 - SWAP_S), sortie_end_s=40.0)
+    agent.hear("u1", parked)
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.run_until(55.0)
+    assert (agent.state(), agent.stage) == (AgentState.ABOVE_BASE, BaseStage.WAITING)
+
+    agent.hear("u1", replace(parked, arrives_s=51.0 - SWAP_S), 56.0)
+
+    assert agent.state() is AgentState.SWAPPING
+
+
+def test_who_comes_when_it_said_lands_before_those_who_said_they_come_later(
+    script: Script,
+) -> None:
+    agent = on_its_way(script, "u1", "u2")
+    agent.hear("u1", visiting(BaseStage.APPROACHING, 50.1))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+
+    assert (agent.state(), agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+
+
+def test_who_comes_just_before_the_slot_is_left_lands_when_it_is(script: Script) -> None:
+    agent = on_its_way(script, "u1", "u2")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.hear("u2", visiting(BaseStage.APPROACHING, 60.0))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    assert agent.stage is BaseStage.WAITING
+
+    agent.hear("u1", visiting(BaseStage.PARKED, 5.0), 50.01)
+
+    assert agent.state() is AgentState.SWAPPING
+
+
+@pytest.mark.parametrize("arrives_s", [45.0, 55.0])
+def test_who_comes_when_nobody_expects_it_waits_for_objections(
+    script: Script, arrives_s: float
+) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.APPROACHING, 60.0))
+    agent.run_until(arrives_s - 1.0)
+    agent.arrive(arrives_s)
+
+    assert (agent.state(), agent.stage) == (AgentState.ABOVE_BASE, BaseStage.WAITING)
+    agent.run_until(arrives_s + 2.0 * agent.timing.objection_window_s)
     assert agent.state() is AgentState.SWAPPING
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import random
 
-from swarm.protocol.bases import blocking, may_land
+from swarm.protocol.bases import arrival_order, blocking, may_land
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
 
 B = "b0"
@@ -78,6 +78,26 @@ def test_the_lost_keep_the_slot_they_stand_on_until_they_are_said_to_be_ready() 
     assert blocking(claims, lost, ready={"u1"}) == {}
     assert not may_land("u0", B, 1, {"u0": COMING}, blocking(claims, lost), waited=True)
     assert may_land("u0", B, 2, {"u0": COMING}, blocking(claims, lost), waited=False)
+
+
+def test_of_those_who_come_when_they_said_no_more_land_at_once_than_there_are_slots() -> None:
+    """And the first of them need not wait, whoever else is on its way."""
+    rng = random.Random(2)
+    for slots, _ in itertools.product((1, 2, 3), range(200)):
+        claims = {
+            f"u{i}": at_base(
+                BaseStage.APPROACHING, float(rng.randint(0, 3)), rank=rng.randint(0, 2)
+            )
+            for i in range(rng.randint(1, 6))
+        }
+        landing = [
+            uav
+            for uav in claims
+            if may_land(uav, B, slots, claims, {}, waited=False, punctual=True)
+        ]
+        assert len(landing) == min(len(claims), slots)
+        arrivals = sorted(claims, key=lambda uav: arrival_order(uav, claims[uav]))
+        assert set(landing) == set(arrivals[:slots])
 
 
 def test_wherever_all_know_the_same_no_more_land_than_there_are_slots() -> None:
