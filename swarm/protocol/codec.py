@@ -81,6 +81,7 @@ IN_SEALED_ANSWER: Final = 64
 """Arrays and maps of an answer in which all registers but the roster are envelopes."""
 SIGNED_HERE: Final = "signed, but no keys here"
 UNKNOWN_VERSION: Final = "unknown version"
+_VERSIONS: Final = (SCHEMA_VERSION, FIELD_VERSION)
 
 WIRE_DEFAULTS: Final[Mapping[str, Mapping[str, object]]] = {}
 """By kind, what a field means that an older release does not say; of fields that were added
@@ -325,7 +326,8 @@ class Codec:
         if not isinstance(parts, tuple) or len(parts) < 7:
             raise UnacceptableError("malformed")
         version, mission, writer, incarnation, counter, kind, fields = parts[:7]
-        _require(version in (SCHEMA_VERSION, FIELD_VERSION), UNKNOWN_VERSION)
+        if version not in _VERSIONS:
+            raise UnacceptableError(UNKNOWN_VERSION)
         self._require_ours(mission, writer)
         if not isinstance(kind, str) or kind not in KINDS:
             raise UnacceptableError("unknown kind")

@@ -7,9 +7,11 @@ length of the bytes is worth.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
-from typing import Final
+from operator import attrgetter
+from types import SimpleNamespace
+from typing import Any, Final
 
 import msgpack
 
@@ -82,7 +84,16 @@ PLAIN_FIELDS: Final[dict[type, tuple[str, ...]]] = {
     for part, names in FIELDS.items()
 }
 """All others."""
-_NOTHING: Final[dict[str, object]] = {}
+_ADDED: Final = {
+    part: (attrgetter(*defaults), attrgetter(*defaults)(SimpleNamespace(**defaults)))
+    for part, defaults in FIELD_DEFAULTS.items()
+}
+"""How the added fields are read at once, and what that gives by default."""
+_PARTS: Final[dict[type, Callable[[Any], Iterable[object]]]] = {
+    MissionConfig: lambda brief: brief.uavs,
+    Choice: lambda choice: (choice.basis,),
+}
+"""What a body is made of that has added fields of its own."""
 LARGE: Final = frozenset({"brief", "choice", "epoch", "roster"})
 
 
@@ -133,27 +144,42 @@ def fit(
 
 
 def _message_bytes(message: Message) -> bytes:
-    version = SCHEMA_VERSION
-
-    def fields_of(part: object) -> dict[str, object]:
-        nonlocal version
-        told = {name: getattr(part, name) for name in PLAIN_FIELDS[type(part)]}
-        for name, default in FIELD_DEFAULTS.get(type(part), _NOTHING).items():
-            value = getattr(part, name)
-            if value is not default and value != default:
-                told[name], version = value, FIELD_VERSION
-        return told
-
-    body: bytes = msgpack.packb(message.body, default=fields_of)
-    head = (
-        version,
+    stamp, body = message.stamp, message.body
+    plain = _is_plain(body)
+    parts = (
+        SCHEMA_VERSION if plain else FIELD_VERSION,
         message.mission,
         message.writer,
-        message.stamp.incarnation,
-        message.stamp.counter,
-        NAMES[type(message.body)],
+        stamp.incarnation,
+        stamp.counter,
+        NAMES[type(body)],
+        body,
     )
-    return _array([*map(msgpack.packb, head), body])
+    packer = msgpack.Packer(default=_plain_fields_of if plain else _fields_of)
+    packed: bytes = packer.pack(parts)  # by `packb` a claim takes a tenth longer
+    return packed
+
+
+def _is_plain(part: object) -> bool:
+    """Whether a release without `FIELD_VERSION` understands all that ``part`` says."""
+    kind = type(part)
+    if kind in _ADDED:
+        read, default = _ADDED[kind]
+        if read(part) != default:
+            return False
+    return kind not in _PARTS or all(map(_is_plain, _PARTS[kind](part)))
+
+
+def _plain_fields_of(part: object) -> dict[str, object]:
+    return {name: getattr(part, name) for name in PLAIN_FIELDS[type(part)]}
+
+
+def _fields_of(part: object) -> dict[str, object]:
+    told = _plain_fields_of(part)
+    for name, default in FIELD_DEFAULTS.get(type(part), {}).items():
+        if (value := getattr(part, name)) != default:
+            told[name] = value
+    return told
 
 
 def snapshot_bytes(snapshot: Snapshot, registers: Sequence[bytes]) -> bytes:
