@@ -25,17 +25,21 @@ struct Worth {
     }
 };
 
+// A list that can be done is changed step by step, each of them to a better one.
 class Improvement {
   public:
     Improvement(const FieldProblem& problem, int uav, const Progress& begin, int landed_at,
                 const std::vector<int>& able, bool may_swap, const FieldList& list)
-        : problem_(problem), uav_(uav), begin_(begin), landed_at_(landed_at),
-          n_base_(may_swap ? problem.n_base : 0), list_(list) {
+        : problem_(problem), uav_(uav), landed_at_(landed_at),
+          n_base_(may_swap ? problem.n_base : 0) {
         for (const int task : able) {
             const auto holds = [&](Item item) { return !is_base(item) && task_of(item) == task; };
-            if (std::none_of(list_.begin(), list_.end(), holds)) left_.push_back(task);
+            if (std::none_of(list.begin(), list.end(), holds)) left_.push_back(task);
         }
-        worth_ = worth(list_);
+        reached_.push_back({begin, 0});
+        tried_ = list;
+        worth_ = worth(0);
+        keep(0);
     }
 
     OwnPlan run() {
@@ -45,29 +49,51 @@ class Improvement {
     }
 
   private:
-    Worth worth(const FieldList& list) {
-        Progress progress = begin_;
+    struct Reached {
+        Progress progress;
+        int n_required;
+    };
+
+    // Of `tried_`, whose first `n_same` items are those of `list_`. They count as steps, too: what
+    // is found is not to depend on what is remembered.
+    Worth worth(std::size_t n_same) {
+        Reached now = reached_[n_same];
         Times times;
         Worth worth;
-        for (std::size_t i = 0; i < list.size(); ++i) {
-            const Item item = list[i];
-            const bool again = i > 0 ? list[i - 1] == item : item == item_of_base(landed_at_);
-            if (is_base(item) && (again || i + 1 == list.size())) return worth;
+        steps_ += static_cast<std::int64_t>(n_same);
+        for (std::size_t i = n_same; i < tried_.size(); ++i) {
+            const Item item = tried_[i];
+            const bool again = i > 0 ? tried_[i - 1] == item : item == item_of_base(landed_at_);
+            if (is_base(item) && (again || i + 1 == tried_.size())) return worth;
             ++steps_;
-            if (do_item(problem_, uav_, item, progress, times) != Refusal::kNone) return worth;
-            if (!is_base(item)) worth.n_required += problem_.required[task_of(item)];
+            if (do_item(problem_, uav_, item, now.progress, times) != Refusal::kNone) return worth;
+            if (!is_base(item)) now.n_required += problem_.required[task_of(item)];
         }
         worth.feasible = true;
-        worth.value = progress.value;
+        worth.n_required = now.n_required;
+        worth.value = now.progress.value;
         return worth;
     }
 
-    bool take(const FieldList& tried) {
-        const Worth found = worth(tried);
+    bool take(std::size_t n_same) {
+        const Worth found = worth(n_same);
         if (!found.better_than(worth_)) return false;
-        list_ = tried;
         worth_ = found;
+        keep(n_same);
         return true;
+    }
+
+    // `tried_` is the list from now on.
+    void keep(std::size_t n_same) {
+        list_ = tried_;
+        reached_.resize(n_same + 1);
+        for (std::size_t i = n_same; i < list_.size(); ++i) {
+            Reached next = reached_.back();
+            Times times;
+            do_item(problem_, uav_, list_[i], next.progress, times);
+            if (!is_base(list_[i])) next.n_required += problem_.required[task_of(list_[i])];
+            reached_.push_back(next);
+        }
     }
 
     // A task that is left out, anywhere, as it is or behind a swap.
@@ -83,7 +109,7 @@ class Improvement {
                         if (base >= 0) {
                             tried_.insert(tried_.begin() + place, item_of_base(base));
                         }
-                        if (take(tried_)) {
+                        if (take(at)) {
                             left_.erase(left_.begin() + static_cast<std::ptrdiff_t>(nth));
                             return true;
                         }
@@ -96,11 +122,15 @@ class Improvement {
 
     // An item elsewhere, a line in either direction; or a visit to a base left out.
     bool move_any() {
+        FieldList without;
         for (std::size_t from = 0; from < list_.size(); ++from) {
             const Item item = list_[from];
-            FieldList without = list_;
+            without = list_;
             without.erase(without.begin() + static_cast<std::ptrdiff_t>(from));
-            if (is_base(item) && take(without)) return true;
+            if (is_base(item)) {
+                tried_ = without;
+                if (take(from)) return true;
+            }
             const bool turns = !is_base(item) && problem_.is_line[task_of(item)];
             for (std::size_t to = 0; to <= without.size() && steps_ < kMostSteps; ++to) {
                 for (int turned = 0; turned <= (turns ? 1 : 0); ++turned) {
@@ -108,7 +138,7 @@ class Improvement {
                     tried_ = without;
                     tried_.insert(tried_.begin() + static_cast<std::ptrdiff_t>(to),
                                   turned ? item ^ 1 : item);
-                    if (take(tried_)) return true;
+                    if (take(std::min(from, to))) return true;
                 }
             }
         }
@@ -116,10 +146,9 @@ class Improvement {
     }
 
     const FieldProblem& problem_;
-    const int uav_;
-    const Progress begin_;
-    const int landed_at_, n_base_;
+    const int uav_, landed_at_, n_base_;
     FieldList list_, tried_;
+    std::vector<Reached> reached_;  // after so many items of the list
     std::vector<int> left_;
     Worth worth_;
     std::int64_t steps_ = 0;

@@ -3,8 +3,7 @@
 
 #include <algorithm>
 #include <limits>
-
-#include "field_lookahead.hpp"
+#include <utility>
 
 namespace peckorder {
 
@@ -104,9 +103,7 @@ FieldChoice FieldDecider::by_greedy(const FieldView& view, BaseTraffic& traffic,
 FieldChoice FieldDecider::lookahead(const FieldView& view, BaseTraffic& traffic, Swaps swaps) {
     const FieldProblem& problem = view.problem;
     const bool may_swap = swaps != Swaps::kNever;
-    const OwnPlan plan =
-        own_plan(problem, view.uav, view.progress, view.here, view.open, may_swap,
-                 [&] { return greedy_list(view, may_swap); });
+    const OwnPlan& plan = own_list(view, may_swap);
     if (plan.list.empty()) return {};
     if (is_base(plan.list.front()) && swaps == Swaps::kLater) {
         return lookahead(view, traffic, Swaps::kNever);
@@ -125,6 +122,27 @@ FieldChoice FieldDecider::lookahead(const FieldView& view, BaseTraffic& traffic,
         refusal = do_task(problem, view.uav, choice.item, progress, choice.times);
     }
     return refusal == Refusal::kNone ? choice : by_greedy(view, traffic, swaps);
+}
+
+bool FieldDecider::KnownPlan::answers(const FieldView& view, bool swaps) const {
+    const Progress& now = view.progress;
+    return uav == view.uav && here == view.here && may_swap == swaps &&
+           progress.time_s == now.time_s && progress.sortie_end_s == now.sortie_end_s &&
+           progress.legs_s == now.legs_s && progress.landed == now.landed &&
+           progress.survived == now.survived && open == view.open;
+}
+
+// A run that is gone through anew from a barred visit on meets most of its questions again.
+const OwnPlan& FieldDecider::own_list(const FieldView& view, bool may_swap) {
+    const auto known = std::find_if(known_.begin(), known_.end(), [&](const KnownPlan& plan) {
+        return plan.answers(view, may_swap);
+    });
+    if (known != known_.end()) return known->plan;
+    OwnPlan plan = own_plan(view.problem, view.uav, view.progress, view.here, view.open, may_swap,
+                            [&] { return greedy_list(view, may_swap); });
+    known_.push_back(
+        {view.uav, view.here, may_swap, view.progress, view.open, std::move(plan)});
+    return known_.back().plan;
 }
 
 // What greedy would do next and next, alone.
@@ -266,6 +284,7 @@ void FieldRun::push(double time_s, Kind kind, int uav) {
 void FieldRun::run(const FieldProblem& problem, const FieldTeam& team, FieldRule rule,
                    Watch& watch, int first) {
     bars_.clear();
+    decider_.forget();
     n_run_ = 0;
     do {
         once(problem, team, rule, watch, first);

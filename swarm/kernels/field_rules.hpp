@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "field.hpp"
+#include "field_lookahead.hpp"
 #include "field_team.hpp"
 #include "watch.hpp"
 
@@ -82,10 +83,23 @@ class FieldDecider {
  public:
     // By `rule`; may be infeasible only in as far as `traffic` turns out to be another.
     FieldChoice decide(FieldRule rule, const FieldView& view, BaseTraffic& traffic, Swaps swaps);
+    void forget() { known_.clear(); }  // what it keeps of one run of one problem
 
  private:
+    // An own best list, and all that it follows from.
+    struct KnownPlan {
+        int uav, here;
+        bool may_swap;
+        Progress progress;
+        std::vector<int> open;
+        OwnPlan plan;
+
+        bool answers(const FieldView& view, bool swaps) const;
+    };
+
     FieldChoice by_greedy(const FieldView& view, BaseTraffic& traffic, Swaps swaps);
     FieldChoice lookahead(const FieldView& view, BaseTraffic& traffic, Swaps swaps);
+    const OwnPlan& own_list(const FieldView& view, bool may_swap);
     std::vector<Item> greedy_list(const FieldView& view, bool may_swap);
     FieldChoice greedy(const FieldView& view) const;
     FieldChoice base(const FieldView& view, BaseTraffic& traffic);
@@ -99,6 +113,7 @@ class FieldDecider {
     };
     std::vector<Label> labels_;  // (n_base,)
     BaseTraffic nobody_;
+    std::vector<KnownPlan> known_;
 };
 
 struct FieldDecision {
