@@ -19,7 +19,7 @@ from typing import Any, ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from agent.core.interface import GoTo, Hold, Prepare, Return, VehicleOrder
+from agent.core.interface import GoTo, Hold, KeepOut, Prepare, Ready, Return, Swap, VehicleOrder
 from agent.vehicle.activity import FlightPhase
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.codec import _CONVERTERS
@@ -27,6 +27,7 @@ from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.conversation import SendBytes
 from agent.vehicle.session import BridgeEvent, BytesReceived, LinkClosed, LinkOpened, TimePassed
 from agent.vehicle.signing import Signing, SigningKey
+from swarm.model import Zone, ZoneId
 from tests.support.bridge_flight import ORIGIN, UNIX_S
 from tests.support.bridge_watch import BridgeWatch
 from tests.support.fake_copter import (
@@ -57,7 +58,14 @@ _PHASES = (
     FlightPhase.FLYING,
     FlightPhase.HOLDING,
     FlightPhase.RETURNING,
+    FlightPhase.LANDING,
+    FlightPhase.STANDING,
     FlightPhase.HANDED_OVER,
+)
+_BASE = (5.0, 0.0, 0.0)
+_WALLS = (
+    Zone(ZoneId("wall"), ((15.0, -30.0), (25.0, -30.0), (25.0, 30.0), (15.0, 30.0))),
+    Zone(ZoneId("round"), ((-3.0, -8.0), (12.0, -8.0), (12.0, 8.0), (-3.0, 8.0)), floor_m=5.0),
 )
 _SIGNED = 1
 _INTERESTING = (0, 1, 2, 3, 4, 6, 16, 0x7F, 0x80, 0xFF)
@@ -324,6 +332,7 @@ class Episode:
             # Somebody who has the key, so that damage reaches what lies behind it.
             self._forger = Signing(KEY, lambda: UNIX_S + self.now_s, link_id=7)
         self._legs = 0
+        self.copter.battery_percent = self.random.choice((80, 95))
 
     def play(self, steps: int = STEPS_PER_EPISODE) -> int:
         """Bring the bridge into a phase and be hostile for so many events; steps taken.
@@ -344,6 +353,9 @@ class Episode:
         """Let the pilot give the vehicle back, if it was taken, and fly it into ``phase``."""
         if self.copter.airborne:
             self.copter.set_mode(self.copter.own_mode)
+        if self.bridge.phase is FlightPhase.STANDING:
+            self._happen(Return("enough"))
+        self._happen(self._zones())
         self._happen(replace(START, resume=self.copter.airborne))
         patience = self.random.randrange(200) if phase is FlightPhase.PREPARING else _BRING_UP_STEPS
         for _ in range(patience):
@@ -354,11 +366,29 @@ class Episode:
             self._happen(self._go_to(inside=True))
         elif phase is FlightPhase.RETURNING:
             self._happen(Return("enough"))
+        elif phase in (FlightPhase.LANDING, FlightPhase.STANDING):
+            self._happen(self._swap())
+            if phase is FlightPhase.STANDING:
+                self._stand()
         elif phase is FlightPhase.HOLDING:
             self._happen(Hold("wait"))
         elif phase is FlightPhase.HANDED_OVER:
             self.copter.set_mode(self.copter.pilot_mode)
         self._fly(_BRING_UP_STEP_S)
+
+    def _stand(self) -> None:
+        """Wait until it has landed, and perhaps until it departs."""
+        departs = self.random.random() < 0.5
+        for _ in range(_BRING_UP_STEPS):
+            self._fly(_BRING_UP_STEP_S)
+            if self.bridge.phase is FlightPhase.STANDING:
+                break
+        if departs:
+            self._happen(Ready(self._legs))
+            self._fly(1.0)
+            self._happen(self._go_to(inside=True))
+            for _ in range(self.random.randrange(100)):
+                self._fly(_BRING_UP_STEP_S)
 
     def _fly(self, duration_s: float) -> None:
         """Let time pass with a vehicle that behaves."""
@@ -409,7 +439,7 @@ class Episode:
 
     def _order(self) -> VehicleOrder:
         random = self.random
-        match random.randrange(9):
+        match random.randrange(13):
             case 0 | 1:
                 speed_m_s = random.choice((4.0, 4.0, 4.0, 0.0, -1.0, math.nan, math.inf))
                 return Prepare(self._place(), speed_m_s, resume=random.random() < 0.5)
@@ -417,14 +447,39 @@ class Episode:
                 return self._go_to(inside=random.random() < 0.7)
             case 6 | 7:
                 return Hold("wait")
+            case 8:
+                return self._swap()
+            case 9 | 10:
+                return Ready(self._legs + random.choice((0, 0, 0, -1)))
+            case 11:
+                return self._zones()
             case _:
                 via = self._place() if random.random() < 0.5 else None
-                return Return("enough", resume=random.random() < 0.5, via_enu_m=via)
+                path = self._corners() if random.random() < 0.5 else ()
+                resumes, lands = random.random() < 0.5, random.random() < 0.5
+                return Return("enough", resumes, via, path, lands)
+
+    def _zones(self) -> KeepOut:
+        zones = tuple(zone for zone in _WALLS if self.random.random() < 0.3)
+        return KeepOut(zones, self.random.choice((0.0, 3.0)))
+
+    def _swap(self) -> Swap:
+        self._legs += 1
+        away = self.random.random()
+        place = _BASE if away < 0.7 else (-20.0, 5.0, 0.0) if away < 0.9 else self._place()
+        return Swap(self._legs, place, 5.0, self.random.choice((None, 4.0)))
+
+    def _corners(self) -> tuple[tuple[float, float, float], ...]:
+        uniform, wild = self.random.uniform, self.random.random() < 0.1
+        corners = [(uniform(-50.0, 50.0), uniform(-50.0, 50.0), 10.0) for _ in range(2)]
+        return (*corners, self._place()) if wild else tuple(corners[: self.random.randrange(3)])
 
     def _go_to(self, *, inside: bool) -> GoTo:
         self._legs += 1
         place = (self.random.uniform(-50.0, 50.0), self.random.uniform(-50.0, 50.0), 10.0)
-        return GoTo(self._legs, place if inside else self._place(), self.random.choice((0.0, 5.0)))
+        via = self._corners() if self.random.random() < 0.5 else ()
+        stay_s = self.random.choice((0.0, 5.0))
+        return GoTo(self._legs, place if inside else self._place(), stay_s, via_enu_m=via)
 
     def _place(self) -> tuple[float, float, float]:
         random = self.random

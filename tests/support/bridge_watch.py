@@ -17,6 +17,10 @@
 8. It wants to be called again within a heartbeat's interval, and not at once for ever.
 9. It remembers no more for hearing more.
 10. What it makes the vehicle do next may follow what it made it do before.
+11. No target lies in a zone, nor straight behind one from wherever the vehicle said it was or was
+   sent, unless that is in the zone too.
+12. A vehicle that has landed for another battery is not told anything, and its motors are not
+   started before somebody has let it start again since.
 
 Leaves out: whether it does anything useful.
 """
@@ -29,6 +33,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, is_dataclass, replace
 from typing import Any
 
+import shapely
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import (
@@ -38,9 +43,14 @@ from agent.core.interface import (
     HandOverExplained,
     HeardAgain,
     Hold,
+    KeepOut,
+    Landed,
     Prepare,
+    Ready,
     Refused,
     Return,
+    Swap,
+    Swapped,
     Telemetry,
     VehicleReady,
     VehicleReport,
@@ -53,6 +63,7 @@ from agent.vehicle.firmware.ardupilot import ArduCopter
 from agent.vehicle.firmware.px4 import Px4Copter
 from agent.vehicle.session import BridgeEvent, TimePassed
 from agent.vehicle.transitions import SUCCESSORS
+from swarm.model import Zone
 from swarm.model.frames import enu_from_wgs84
 from tests.support.fake_copter import (
     ARM,
@@ -73,6 +84,8 @@ _MOST_REMEMBERED = 4_000
 _MOST_BUFFERED_BYTES = 280
 """The longest frame there is."""
 _PLACES = 50
+_ASIDE_M = 1.0
+"""So much nearer than the margin of a zone a way may come."""
 _FASTEST_M_S = 50.0
 _RECENT = 20
 _LEAP_M = 25.0
@@ -97,6 +110,8 @@ _COMMANDS: dict[FlightPhase, set[int]] = {
     FlightPhase.FLYING: {REPOSITION},
     FlightPhase.HOLDING: {SET_MODE, REPOSITION, ARM},
     FlightPhase.RETURNING: {SET_MODE, REPOSITION},
+    FlightPhase.LANDING: {SET_MODE, REPOSITION, ARM},
+    FlightPhase.STANDING: set(),
     FlightPhase.HANDED_OVER: set(),
 }
 """What may be commanded in each phase, beside requests for messages; motors are started
@@ -132,6 +147,8 @@ class _Task:
     if the vehicle does not take a newer one, and may be taken up again after a hand-over."""
     leg: int | None = None
     """Under way."""
+    base_m: Point | None = None
+    """Where to land for another battery."""
     told_m: list[tuple[Point, float]] = field(default_factory=list)
     """Where the vehicle said it was when it was ordered, and since; and when."""
 
@@ -169,6 +186,12 @@ class BridgeWatch:
         self._heard_again = False
         """Since it was handed over."""
         self._mode_wanted: set[tuple[float, float]] = set()
+        self._zones: list[tuple[Zone, float]] = []
+        """To be kept out of, and how far."""
+        self._base_m: Point | None = None
+        """Where it was last ordered to land for another battery."""
+        self._stood = self._may_start = False
+        """Whether it landed there and has not flown since, and may start again."""
 
     def step(self, event: BridgeEvent, now_s: float) -> list[BridgeAction]:
         """Step the bridge and look at what it does."""
@@ -176,12 +199,19 @@ class BridgeWatch:
         self._now_s = now_s
         before = self.bridge.phase
         self._task_before, self._ordered = self._task, event
-        if isinstance(event, Prepare | GoTo | Hold | Return):
+        if isinstance(event, Prepare | GoTo | Hold | Return | Swap):
             self._note(event)
+        elif isinstance(event, KeepOut):
+            self._zones = [(zone, event.margin_m) for zone in event.zones]
+        elif isinstance(event, Ready):
+            let = before is FlightPhase.STANDING and event.leg == self._task.leg
+            self._may_start |= let
         self._gave_mission &= not isinstance(event, Return)
         actions = self.bridge.step(event, now_s)
         self.fake = _FAKES.get(type(self.bridge._session.firmware), self.fake)
         after = self.bridge.phase
+        if after not in (FlightPhase.STANDING, FlightPhase.PREPARING):
+            self._stood = self._may_start = False
         follows = after is before or after in SUCCESSORS[before]
         hold(follows, f"{after.value} follows {before.value}")
         for action in actions:
@@ -193,9 +223,15 @@ class BridgeWatch:
         self._see_size()
         return actions
 
-    def _note(self, order: Prepare | GoTo | Hold | Return) -> None:
+    def _note(self, order: Prepare | GoTo | Hold | Return | Swap) -> None:
         self._silent = False
         places_m = self._task.places_m
+        if isinstance(order, GoTo | Return):
+            corners_m = order.via_enu_m if isinstance(order, GoTo) else order.path_enu_m
+            places_m += corners_m
+            if self._stood and self._base_m is not None and isinstance(order, GoTo):
+                first_m = (*corners_m, order.position_enu_m)[0]
+                places_m += ((*self._base_m[:2], first_m[2]),)
         match order:
             case Prepare(position_enu_m):
                 self._prepared = True
@@ -204,6 +240,9 @@ class BridgeWatch:
                 self._task = _Task((*places_m[-_PLACES:], position_enu_m), leg)
             case Return(via_enu_m=tuple() as via_enu_m):
                 self._task = _Task((*places_m[-_PLACES:], via_enu_m))
+            case Swap(leg, position_enu_m):
+                self._base_m = position_enu_m
+                self._task = _Task(places_m, leg, position_enu_m)
             case Hold() | Return():
                 self._task = _Task(places_m)
         self._task.told_m.extend(self._heres_m)
@@ -293,6 +332,8 @@ class BridgeWatch:
                 hold(message.param2 == 0.0, "motors by force")
                 if message.param1 == 1.0:
                     hold(FlightPhase.PREPARING in phases, f"motors started while {phases}")
+                    may_start = self._may_start or not self._stood
+                    hold(may_start, "motors started at a base, though nobody let it start")
             case 176:
                 hold(message.param1 == _MODE_ENABLED, f"mode of kind {message.param1}")
                 self._see_mode(message, phases, missions=missions)
@@ -306,6 +347,9 @@ class BridgeWatch:
             mode = mode << 16 | int(message.param3) << 24
         if mode == self.fake.return_mode:
             hold(FlightPhase.RETURNING in phases, f"sent home while {phases}")
+        elif mode == self.fake.land_mode:
+            comes_down = {FlightPhase.RETURNING, FlightPhase.LANDING} & phases
+            hold(bool(comes_down), f"landed while {phases}")
         elif mode != self.fake.own_mode:
             hold(missions and mode == self.fake.mission_mode, f"mode {mode}")
 
@@ -317,9 +361,25 @@ class BridgeWatch:
         hold(fault is None, f"sent beyond the fence, to {place_m}: {fault}")
         if FlightPhase.HOLDING in phases and self._is_borne_out(place_m):
             return
-        places_m = self._task.places_m
+        places_m, base_m = self._task.places_m, self._task.base_m
         ordered = any(_near(place_m, place) for place in places_m)
+        if FlightPhase.LANDING in phases and base_m is not None:
+            ordered |= math.dist(place_m[:2], base_m[:2]) <= _TOLERANCE_M
+        self._see_zones(place_m)
         hold(ordered, f"sent to {place_m}, not to {places_m[-3:]}")
+
+    def _see_zones(self, place_m: Point) -> None:
+        from_m = [*(told for told, _ in self._task.told_m), *self._task.places_m]
+        from_m += [told for told, _ in self._heres_m]
+        for zone, margin_m in self._zones:
+            shape, near_m = zone.shape(), max(0.0, margin_m - _ASIDE_M)
+            kept_m = [(*each[:2],) for each in from_m if all(map(math.isfinite, each))]
+            lines = [shapely.LineString([each, place_m[:2]]) for each in kept_m]
+            beside = any(shapely.distance(shape, line) >= near_m - _TOLERANCE_M for line in lines)
+            inside = any(
+                shape.dwithin(shapely.Point(each), near_m + _TOLERANCE_M) for each in kept_m
+            )
+            hold(beside or inside, f"sent to {place_m}, behind zone {zone.id}")
 
     def _is_borne_out(self, place_m: Point) -> bool:
         """Whether the vehicle told it is there, and another place from which it can have come."""
@@ -364,6 +424,12 @@ class BridgeWatch:
                 self._lost, self._heard_again = False, True
             case HandOverExplained():
                 hold(self.bridge.phase is FlightPhase.HANDED_OVER, "explained, though it is ours")
+            case Landed(leg):
+                hold(leg == self._task.leg, f"landed by order {leg}, not {self._task.leg}")
+                self._stood = True
+            case Swapped(leg):
+                hold(leg == self._task.leg, f"swapped by order {leg}, not {self._task.leg}")
+                hold(self._may_start, "ready, though nobody let it start")
             case VehicleReady():
                 hold(self._prepared, "ready, though nobody asked")
                 self._prepared = False
