@@ -31,6 +31,8 @@ from coordinator.dashboard.page_input import (
     PlaybackInput,
     TaskInput,
     WithdrawalInput,
+    ZoneInput,
+    ZoneRemovalInput,
     fault_of,
 )
 from coordinator.dashboard.source import DashboardSource, Refusal, RefusedError
@@ -96,6 +98,8 @@ class Dashboard:
             Route(
                 "/api/task/withdraw", self._taking(WithdrawalInput, self._give), methods=["POST"]
             ),
+            Route("/api/zone", self._taking(ZoneInput, self._give), methods=["POST"]),
+            Route("/api/zone/remove", self._taking(ZoneRemovalInput, self._give), methods=["POST"]),
             Route("/api/recording", self._taking(PlaybackInput, self._play), methods=["POST"]),
             WebSocketRoute("/feed", self._feed),
             Mount("/static", StaticFiles(directory=static, check_dir=False)),
@@ -236,7 +240,11 @@ class Dashboard:
 
         return endpoint
 
-    def _give(self, said: CommandInput | TaskInput | WithdrawalInput, who: str) -> dict[str, int]:
+    def _give(
+        self,
+        said: CommandInput | TaskInput | WithdrawalInput | ZoneInput | ZoneRemovalInput,
+        who: str,
+    ) -> dict[str, int]:
         if (orders := self._source.orders) is None:
             recorded = self._source.player is not None
             keys = "these keys only look on: start swarm dashboard with an operator's"

@@ -24,7 +24,12 @@ from swarm.allocation.problem import Problem
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskState
 from swarm.protocol.messages import MissionConfig
-from swarm.protocol.operator_commands import abort_command, in_force
+from swarm.protocol.operator_commands import (
+    abort_command,
+    in_force,
+    zone_edits,
+    zones_in_force,
+)
 from swarm.protocol.uav_messages import Choice
 
 PROTOCOL = 1
@@ -61,6 +66,7 @@ class Feed:
         self._brief: MissionConfig | None = None
         self._head: dict[str, object] = {}
         self._uavs, self._tasks, self._lists = RowTable(), RowTable(), RowTable()
+        self._zones = RowTable()
         self._story = AppendOnlyTable(_STORY)
         self._told = 0
         self._choices = AppendOnlyTable(_CHOICES)
@@ -122,6 +128,7 @@ class Feed:
             "uavs": self._uavs.after(after),
             "tasks": self._tasks.after(after),
             "lists": self._lists.after(after),
+            "zones": self._zones.after(after),
             "story": self._story.after(after),
             "choices": self._choices.after(after),
             "objective_curve": self._curve_after(after),
@@ -171,6 +178,7 @@ class Feed:
         self._look_at_choices(mission_state)
         if brief is not None:
             self._look_at_uavs(mission_state, brief, now_s)
+            self._look_at_zones(mission_state)
 
     def _begin(self, mission_state: MissionState | None, brief: MissionConfig | None) -> None:
         """Another mission, or the same in other words: everything is told anew."""
@@ -179,7 +187,7 @@ class Feed:
             self._choices.clear()
             self._told, self._chosen, self._last_choice = 0, 0, None
         self._mission_state, self._brief = mission_state, brief
-        for table in (self._uavs, self._tasks, self._lists):
+        for table in (self._uavs, self._tasks, self._lists, self._zones):
             table.clear()
         self._progress, self._progress_version, self._curve_seqs = None, (-1, -1), []
         self._whole_since, self.mission_seq = self.seq, self.seq
@@ -275,6 +283,11 @@ class Feed:
                     "value": entry.value,
                     "service_s": entry.service_s,
                     "kind": entry.kind,
+                    "path": entry.path_enu_m,
+                    "opens_s": entry.opens_s,
+                    "closes_s": entry.closes_s,
+                    "due_s": entry.due_s,
+                    "height_m": entry.height_m,
                     "state": state,
                     "taken": taken,
                     "uav": holder if done is None else done[0],
@@ -317,6 +330,24 @@ class Feed:
             self._uavs.put(uav.id, row, self.seq, but="silent_s")
             self._uavs.touch(uav.id, row, self.seq, _QUIET_LOOKS)
 
+    def _look_at_zones(self, mission_state: MissionState) -> None:
+        replica = mission_state.replica
+        edits = zone_edits(replica)
+        drawn = {zone.id: zone for zone in zones_in_force(replica)}
+        gone = {name: edit.zone for name, edit in edits.items() if edit.withdrawn}
+        for name, zone in (gone | drawn).items():
+            row = {
+                "id": name,
+                "polygon": zone.polygon_enu_m,
+                "holes": zone.holes_enu_m,
+                "floor_m": zone.floor_m,
+                "ceiling_m": zone.ceiling_m,
+                "inclusive": zone.inclusive,
+                "by": "operator" if name in edits else "scenario",
+                "withdrawn": name not in drawn,
+            }
+            self._zones.put(name, row, self.seq)
+
 
 def _uav_row(state: UavState, command: str | None, speedup: float) -> dict[str, object]:
     age_s = state.link_age_s
@@ -329,6 +360,11 @@ def _uav_row(state: UavState, command: str | None, speedup: float) -> dict[str, 
         "position": _point(state.told_enu_m),
         "velocity": _point(state.velocity_enu_m_s),
         "battery": _rounded(state.battery_frac, 3),
+        "base": state.base,
+        "stage": state.stage,
+        "visit": state.visit,
+        "sortie_end_s": _rounded(state.sortie_end_s, 1),
+        "swaps": state.swaps,
         "silent_s": None if age_s is None else _rounded(age_s / speedup, 1),
         "lost": state.does == LOST,
         "present": state.there,
@@ -348,6 +384,7 @@ def _mission_text(name: str, brief: MissionConfig) -> str:
             "speed_m_s": uav.speed_m_s,
             "kind": uav.kind,
             "layer_m": uav.layer_m,
+            "endurance_s": uav.endurance_s,
         }
         for uav, short in zip(brief.uavs, shorts, strict=True)
     ]
@@ -357,6 +394,16 @@ def _mission_text(name: str, brief: MissionConfig) -> str:
             "name": name,
             "horizon_s": brief.horizon_s,
             "origin": brief.origin,
+            "bases": [
+                {
+                    "id": base.id,
+                    "position": base.position_enu_m,
+                    "swap_s": base.swap_s,
+                    "slots": base.slots,
+                }
+                for base in brief.bases
+            ],
+            "zone_margin_m": brief.zone_margin_m,
             "uavs": uavs,
         },
         allow_nan=False,

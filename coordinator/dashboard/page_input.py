@@ -10,9 +10,11 @@ from annotated_types import Ge, Gt, Le, Len
 from pydantic import Strict, ValidationError
 
 from coordinator.operator.commands import CommandRequest, StartRequest
+from coordinator.operator.readiness import ReadyRequest
 from coordinator.operator.task_edits import NewTask, TaskWithdrawal
+from coordinator.operator.zone_edits import NewZone, ZoneRemoval
 from swarm.model.ids import FLEET
-from swarm.protocol.fields import Duration, Flag, Id, Point, Value
+from swarm.protocol.fields import Duration, Flag, FlatPoint, Id, Metres, Point, Value
 from swarm.protocol.messages import CommandKind
 
 Reason = Annotated[str, Strict(), Len(0, 150)]
@@ -26,12 +28,14 @@ _CHECKED: Final = {"extra": "forbid", "allow_inf_nan": False}
 
 
 class CommandName(StrEnum):
-    """What may be commanded: the kinds of commands, and to start without a UAV."""
+    """What may be commanded: the kinds of commands, to start without a UAV, and that one on the
+    ground may start again."""
 
     HOLD = "hold"
     RESUME = "resume"
     RETURN = "return"
     START = "start"
+    READY = "ready"
     ABORT = "abort"
 
 
@@ -52,8 +56,10 @@ class CommandInput:
             raise ValueError(f"{self.command} concerns {'one UAV: name it' if one else 'all UAVs'}")
 
     @property
-    def wish(self) -> CommandRequest | StartRequest:
+    def wish(self) -> CommandRequest | StartRequest | ReadyRequest:
         """What the operator wants."""
+        if self.command is CommandName.READY:
+            return ReadyRequest(self.uav or "", self.reason)
         if self.command is CommandName.START:
             return StartRequest(self.uav or "", self.reason)
         return CommandRequest(CommandKind(self.command.value), self.uav or FLEET, self.reason)
@@ -93,6 +99,52 @@ class WithdrawalInput:
     def wish(self) -> TaskWithdrawal:
         """What the operator wants."""
         return TaskWithdrawal(self.id, self.reason)
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneInput:
+    """Body of ``/api/zone``."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    id: Id
+    polygon: Annotated[tuple[FlatPoint, ...], Len(3)]
+    """Corners, east and north [m; mission origin]."""
+    floor_m: Metres | None = None
+    ceiling_m: Metres | None = None
+    inclusive: Flag = False
+    reason: Reason = ""
+
+    def __post_init__(self) -> None:
+        # What is wrong with the polygon is told like any other fault of the input.
+        str(self.wish)
+
+    @property
+    def wish(self) -> NewZone:
+        """What the operator wants."""
+        return NewZone(
+            self.id,
+            self.polygon,
+            floor_m=self.floor_m,
+            ceiling_m=self.ceiling_m,
+            inclusive=self.inclusive,
+            reason=self.reason,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ZoneRemovalInput:
+    """Body of ``/api/zone/remove``."""
+
+    __pydantic_config__: ClassVar = _CHECKED
+
+    id: Id
+    reason: Reason = ""
+
+    @property
+    def wish(self) -> ZoneRemoval:
+        """What the operator wants."""
+        return ZoneRemoval(self.id, self.reason)
 
 
 @dataclass(frozen=True, slots=True)

@@ -32,6 +32,7 @@ from swarm.protocol.events import (
     SnapshotsReceived,
 )
 from swarm.protocol.field_messages import ZoneEdit
+from swarm.protocol.fields import Point
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import (
     REVOKED_INCARNATION,
@@ -267,7 +268,7 @@ class MissionState:
             reborn = self._reports.take_status(writer, message.stamp, message.body)
             if reborn is not None:
                 self._narrator.status(writer, message.body, before, now_s, reborn=reborn)
-                self.flights.hear_status(writer, message.body, self._layer_m(writer))
+                self.flights.hear_status(writer, message.body, *self._layer_and_grounds(writer))
             return
         if isinstance(message.body, Choice):
             if self._reports.take_choice(writer, message.stamp, message.body):
@@ -297,11 +298,16 @@ class MissionState:
                 pass
         self._narrator.hear(message, earlier, claim, now_s)
 
-    def _layer_m(self, uav: str) -> float:
-        """Height of a UAV's layer above where it says that it is [m]."""
+    def _layer_and_grounds(self, uav: str) -> tuple[float, list[Point]]:
+        """Height of a UAV's layer above where it says that it is [m], and where it may stand."""
         brief = self.replica.brief
-        uavs = () if brief is None else brief.uavs
-        return next((spec.layer_m for spec in uavs if spec.id == uav), 0.0)
+        if brief is None:
+            return 0.0, []
+        bases = [base.position_enu_m for base in brief.bases]
+        for spec in brief.uavs:
+            if spec.id == uav:
+                return spec.layer_m, [spec.position_enu_m, *bases]
+        return 0.0, bases
 
     def _is_another_visit(self, outcome: Outcome, earlier: Message) -> bool:
         """Whether it is no mere restatement, by a new life of the agent, of what was known."""

@@ -54,6 +54,17 @@ _LEAVING = {
 """Parts of an agent's life in which it takes no tasks any more, in words."""
 _IN_FLIGHT = (StatusPhase.IDLE, StatusPhase.FLYING, StatusPhase.SERVING)
 """Parts in which a note is a remark about the vehicle."""
+_UP_AGAIN = (
+    "its battery is being changed",
+    "waiting to hear",
+    "waiting for",
+    "setting",
+    "arming",
+    "takeoff",
+    "climbing",
+    "flying to",
+)
+"""How bridges begin to say what a vehicle does on a base, and on its way into the air again."""
 
 
 class MissionNarrator:
@@ -232,16 +243,19 @@ class MissionNarrator:
                 self.tell(kind, f"{uav} {how}{because(note)}", now_s, uavs=[uav])
         elif phase in _IN_FLIGHT and note and note != self._remarks.get(uav):
             self._remarks[uav] = note
-            if self._is_of_visit(note):  # its claim has told that already
+            if self._is_routine(note):
                 return
             self.tell(EventKind.REMARK, f"{uav}: {note}", now_s, uavs=[uav])
         elif phase is StatusPhase.HOME and changed:
             self.tell(EventKind.HOME, f"{uav} is home", now_s, uavs=[uav])
 
-    def _is_of_visit(self, note: str) -> bool:
+    def _is_routine(self, note: str) -> bool:
+        """Whether it tells of a visit to a base what a claim has told already."""
         brief = self._replica.brief
         bases = () if brief is None else brief.bases
-        return any(f"base {base.id}" in note for base in bases)
+        return any(f"base {base.id}" in note for base in bases) or (
+            bool(bases) and note.startswith(_UP_AGAIN)
+        )
 
     def choice(self, uav: str, choice: Choice, now_s: float) -> None:
         """Tell that a UAV turns aside; where reasons are wanted, of every choice."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from swarm.model import BaseId, Mission, Task, UavId
@@ -18,6 +19,12 @@ from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, Outcome, S
 
 _KEPT = 32
 """Places remembered of each UAV: for as long as another one's may come late."""
+
+_ON_THE_GROUND = (BaseStage.LANDED, BaseStage.PARKED)
+_NEAR_GROUND_M = 20.0
+"""From a start or a base: who stands that near, stands there."""
+_LIFTED_M = 1.0
+"""Above the ground, from where on a vehicle is in the air; heights drift by less."""
 
 _Fix = tuple[float, Point]
 """Mission time [s] and place [m], its layer included."""
@@ -37,6 +44,8 @@ class _ObservedFlight:
     """Newest places in flight."""
     left_s: float | None = None
     """When it was to take no further part [s]."""
+    left_at_base: bool = False
+    """Whether it stood at a base then: that is home, too."""
     home_s: float | None = None
     """When it was first heard to be home after that [s]."""
 
@@ -51,8 +60,13 @@ class ObservedFlights:
 
     # -- what is heard ------------------------------------------------------------------
 
-    def hear_status(self, uav: str, status: Status, layer_m: float) -> None:
-        """A UAV tells where it is, ``layer_m`` above that."""
+    def hear_status(
+        self, uav: str, status: Status, layer_m: float, grounds: Sequence[Point] = ()
+    ) -> None:
+        """A UAV tells where it is, ``layer_m`` above that.
+
+        Where it stands at one of ``grounds``, a start or a base, it is not in flight.
+        """
         flight = self._flights.setdefault(uav, _ObservedFlight())
         if status.mission_s is None or status.position_enu_m is None:
             return
@@ -65,7 +79,11 @@ class ObservedFlights:
         east_m, north_m, up_m = status.position_enu_m
         if flight.fixes and flight.fixes[-1][0] >= status.mission_s:
             return
-        flight.fixes.append((status.mission_s, (east_m, north_m, up_m + layer_m)))
+        place = east_m, north_m, up_m + layer_m
+        if any(_stands_at(place, ground) for ground in grounds):
+            flight.fixes.clear()
+            return
+        flight.fixes.append((status.mission_s, place))
         for other, rival in self._flights.items():
             if other != uav:
                 self._compare(flight.fixes, rival.fixes)
@@ -88,6 +106,7 @@ class ObservedFlights:
             flight.claims[claim.task] = claim
         if claim.phase is ClaimPhase.OUT and flight.left_s is None:
             flight.left_s = claim.decided_s
+            flight.left_at_base = before is not None and before.stage in _ON_THE_GROUND
         elif claim.phase is not ClaimPhase.OUT:
             flight.left_s = flight.home_s = None
         if claim.stage is BaseStage.LANDED and claim.task is None and claim.arrives_s is not None:
@@ -134,7 +153,12 @@ class ObservedFlights:
                 else:
                     continue
                 entries.append(entry)
-            if entries and flight.left_s is not None and flight.home_s is not None:
+            if (
+                entries
+                and not flight.left_at_base
+                and flight.left_s is not None
+                and flight.home_s is not None
+            ):
                 home: _MapPoint = uav.position_enu_m[:2]
                 times_s = flight.left_s, flight.home_s, flight.home_s, flight.home_s
                 entries.append(ScheduleEntry(START, here, (home,), *times_s))
@@ -167,6 +191,11 @@ class ObservedFlights:
             distance_m = _least_m(apart[0], apart[1])
             if self.closest_approach_m is None or distance_m < self.closest_approach_m:
                 self.closest_approach_m = distance_m
+
+
+def _stands_at(place: Point, ground: Point) -> bool:
+    away_m = math.hypot(place[0] - ground[0], place[1] - ground[1])
+    return away_m <= _NEAR_GROUND_M and place[2] <= ground[2] + _LIFTED_M
 
 
 def _visit(

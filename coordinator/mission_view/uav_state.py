@@ -64,9 +64,11 @@ class UavState:
     """To which it flies, or where it stands, as it was last known."""
     stage: BaseStage | None
     """How far that visit is."""
-    sortie_left_s: float | None
-    """For how long it may fly on, its reserve kept [s of mission]; None: endless, not told, or on
+    sortie_end_s: float | None
+    """By when it must have landed, its reserve kept [s of mission]; None: endless, not told, or on
     the ground."""
+    sortie_left_s: float | None
+    """How long that is from now [s of mission]."""
     swaps: int
     """How often it has landed for another battery."""
 
@@ -192,6 +194,7 @@ class FleetStates:
             dropped=self._dropped.get(uav, {}),
             base=None if claim is None or claim.base is None else BaseId(claim.base),
             stage=None if claim is None else claim.stage,
+            sortie_end_s=None if claim is None else claim.sortie_end_s,
             sortie_left_s=left_s,
             swaps=mission_state.flights.swaps(uav),
         )

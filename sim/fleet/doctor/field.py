@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
+import numpy.typing as npt
 
 from coordinator.planner.schedule_report import around
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
@@ -99,7 +100,7 @@ def _bases(mission: Mission, problem: FieldProblem) -> Iterator[CheckFinding]:
         yield fine("bases", slots)
 
 
-def _leg_from_start_s(problem: FieldProblem) -> np.ndarray[tuple[int, int], np.dtype[np.float64]]:
+def _leg_from_start_s(problem: FieldProblem) -> npt.NDArray[np.float64]:
     """(n_uav, n_base) flight from the start to each base; infinite if it takes too long [s]."""
     bases = slice(problem.n_uav, problem.n_uav + problem.n_base)
     legs_s = np.array(
@@ -138,7 +139,7 @@ def _zones(mission: Mission, problem: FieldProblem) -> Iterator[CheckFinding]:
 def _tasks(mission: Mission, problem: FieldProblem) -> Iterator[CheckFinding]:
     """Whether somebody could do each task as its only one."""
     alone_s = earliest_alone(problem.kernel, FieldState.at_start(problem))
-    can: list[bool] = np.isfinite(alone_s).any(axis=0).tolist()
+    can: npt.NDArray[np.bool_] = np.any(np.isfinite(alone_s), axis=0)
     hopeless = [task for task, able in zip(mission.tasks, can, strict=True) if not able]
     if hopeless:
         text = f"nobody can do {_named(task.id for task in hopeless)}, not even as the only task"

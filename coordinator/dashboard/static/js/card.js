@@ -3,7 +3,7 @@
 import { choiceDetails, concerns } from "./choices.js";
 import { uavColour } from "./colours.js";
 import { make } from "./dom.js";
-import { drawDoing } from "./fleet.js";
+import { drawDoing, sortieLeft } from "./fleet.js";
 import { degreesOf } from "./frames.js";
 import { reasons } from "./links.js";
 import { drawTaskState } from "./tasks.js";
@@ -119,6 +119,9 @@ export class Card {
           : `${number(described.speed_m_s)} m/s at most`,
       ],
       ["Battery", percent(row.battery)],
+      row.base ? ["Base", `${row.base}, ${row.stage}`] : null,
+      row.sortie_end_s ? ["May fly on for", seconds(sortieLeft(row, picture))] : null,
+      described.endurance_s ? ["Batteries changed", String(row.swaps ?? 0)] : null,
       ["Heard", row.silent_s === null ? "never" : `${seconds(row.silent_s)} ago`],
       described.kind ? ["Kind", described.kind] : null,
       ["Layer", described.layer_m === undefined ? NOTHING : `${number(described.layer_m)} m`],
@@ -128,10 +131,10 @@ export class Card {
     ].filter(Boolean);
     const sets = [...list.planned, ...list.flown].map((id) => [id, picture.tasks.get(id)?.state]);
     return [
-      ["state", [row.does, row.lost], () => this.#drawn(drawDoing, row)],
+      ["state", [row.does, row.visit, row.lost], () => this.#drawn(drawDoing, row)],
       [
         "actions",
-        [row.does, row.claim, row.lost, this.operator.able, picture.head?.phase],
+        [row.does, row.claim, row.lost, row.stage, this.operator.able, picture.head?.phase],
         () => this.#uavActions(row),
       ],
       ["facts", facts.map(([title, value, key]) => [title, key ?? String(value)]), () => definition(facts)],
@@ -158,6 +161,11 @@ export class Card {
       ["Value", number(row.value)],
       ["Service", seconds(row.service_s)],
       ["Kind", row.kind ?? NOTHING],
+      row.opens_s ? ["Opens at", seconds(row.opens_s)] : null,
+      row.closes_s === null ? null : ["Closes at", seconds(row.closes_s)],
+      row.due_s === null ? null : ["Due by", seconds(row.due_s)],
+      row.height_m === null ? null : ["Height", `${number(row.height_m)} m`],
+      row.path?.length ? ["Line", `${row.path.length} points`] : null,
       ["Done at", seconds(row.completed_s)],
       ["Place", place(row.position)],
       origin ? ["WGS84", degrees(degreesOf(origin, row.position))] : null,
@@ -192,6 +200,7 @@ export class Card {
         : action("hold", "Hold", gone && row.does !== "returning"),
       row.does === "holding" ? null : action("resume", "Resume", row.claim !== "paused"),
       action("return", "Return home", gone),
+      ["landed", "parked"].includes(row.stage) ? action("ready", "Ready", false) : null,
       this.picture.head?.phase === "preparing" && row.claim === null
         ? action("start", "Start without it", false)
         : null,

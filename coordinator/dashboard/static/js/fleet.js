@@ -27,7 +27,13 @@ export class FleetTable {
           draw: (cell, row) => this.#drawName(cell, row),
         },
         { id: "does", title: "Does", value: doing, rank: doing, draw: drawDoing },
-        { id: "task", title: "Task", value: (row) => row.task ?? NOTHING, rank: (row) => row.task },
+        {
+          id: "task",
+          title: "Task",
+          hint: "Or the base that it flies to, or stands at",
+          value: (row) => row.task ?? row.base ?? NOTHING,
+          rank: (row) => row.task ?? row.base,
+        },
         {
           id: "eta",
           title: "In",
@@ -41,6 +47,13 @@ export class FleetTable {
           value: (row) => percent(row.battery),
           rank: (row) => row.battery,
           draw: drawBattery,
+        },
+        {
+          id: "left",
+          title: "Left",
+          hint: "How long it may fly on before it has to land, its reserve kept",
+          value: (row) => seconds(sortieLeft(row, picture)),
+          rank: (row) => row.sortie_end_s,
         },
         {
           id: "heard",
@@ -98,7 +111,14 @@ export function isTroubled(row) {
 }
 
 function doing(row) {
-  return row.lost ? "lost" : row.does;
+  return row.lost ? "lost" : (row.visit ?? row.does);
+}
+
+/** For how long a UAV may fly on [s]; null where that is endless or not known. */
+export function sortieLeft(row, picture) {
+  const now = picture.head?.mission_s;
+  if (row.sortie_end_s === null || row.sortie_end_s === undefined || now === null) return null;
+  return Math.max(0, row.sortie_end_s - now);
 }
 
 /** Sign and word of what a UAV does. */

@@ -13,6 +13,7 @@ export const KEYS = [
   ["f", "show the whole mission on the map"],
   ["l", "lists on the map: all, of the chosen UAV, none"],
   ["n", "new task: click its place, or move the map and press Enter"],
+  ["z", "new zone: click its corners; Enter when all are there"],
   ["c", "bring what is chosen to the middle"],
   ["Space", "play or pause a recording"],
   ["Esc", "leave what was begun, close the card"],
@@ -71,7 +72,7 @@ export function showHelp() {
       make(
         "p",
         { class: "fine" },
-        "Solid lines were flown, dashed ones are planned; the straight line from a UAV leads to its task.",
+        "Solid lines were flown, dashed ones are planned; the straight line from a UAV leads to its task. Hatched areas are zones where nobody may fly; squares are bases where batteries are changed.",
       ),
       make("menu", {}, make("button", { class: "primary", autofocus: true }, "Close")),
     ),

@@ -71,6 +71,7 @@ const WHOLE = {
   uavs: new Set(),
   tasks: new Set(),
   lists: new Set(),
+  zones: new Set(),
   commands: new Set(),
   story: [],
   choices: [],
@@ -132,6 +133,7 @@ const KEYS = {
   f: () => map.fit(),
   l: () => tools.nextLists(),
   n: () => tools.place(),
+  z: () => tools.draw(),
   c: () =>
     card.of &&
     card.on.centre((card.of.kind === "uav" ? picture.uavs : picture.tasks).get(card.of.id)?.position),
@@ -143,7 +145,7 @@ document.addEventListener("keydown", (event) => {
     if (!tools.leave()) select(null, null);
   } else if (event.key === "Enter" && map.isPlacing && byId("map").contains(event.target)) {
     event.preventDefault();
-    tools.placed(map.middle());
+    tools.entered(map.middle());
   } else if (event.key === " " && !event.target.closest("a, button, input, select, summary, tr")) {
     event.preventDefault();
     replay.toggle();

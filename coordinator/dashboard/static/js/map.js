@@ -44,6 +44,7 @@ export class MissionMap {
     this.taskSpots = new Map();
     this.uavSpots = new Map();
     this.ghosts = [];
+    this.corners = [];
     this.selected = null;
     this.lists = null;
     this.fitted = null;
@@ -97,6 +98,12 @@ export class MissionMap {
   expect(ghosts) {
     this.ghosts = ghosts;
     this.movingDirty = true;
+  }
+
+  /** Corners of the zone that is being drawn. */
+  outline(corners) {
+    this.corners = corners;
+    this.groundDirty = true;
   }
 
   /** Whether there is a map of the earth to switch to. */
@@ -158,7 +165,8 @@ export class MissionMap {
   }
 
   #places() {
-    const starts = (this.picture.mission?.uavs ?? []).map((uav) => uav.start).filter(Boolean);
+    const { uavs = [], bases = [] } = this.picture.mission ?? {};
+    const starts = [...uavs.map((uav) => uav.start).filter(Boolean), ...bases.map((base) => base.position)];
     return [...starts, ...[...this.picture.tasks.values()].map((task) => task.position)];
   }
 
@@ -215,6 +223,7 @@ export class MissionMap {
       uavSize: this.uavSize,
       selected: this.selected,
       ghosts: this.ghosts,
+      corners: this.corners,
       showsList: (uav) => which === "all" || (which === "selected" && uav === this.selected),
     };
   }
@@ -255,7 +264,8 @@ export class MissionMap {
   #hintOf(kind, id) {
     if (kind === "uav") {
       const uav = this.picture.uavs.get(id);
-      return `${id} · ${uav.does}${uav.task ? ` → ${uav.task}` : ""}`;
+      const goal = uav.task ?? uav.base;
+      return `${id} · ${uav.visit ?? uav.does}${goal ? ` → ${goal}` : ""}`;
     }
     const task = this.picture.tasks.get(id);
     return `${id} · ${taskState(task)}${task.uav ? ` · ${task.uav}` : ""} · value ${number(task.value)}`;

@@ -23,6 +23,10 @@ export class MapTools {
       "aria-pressed": "false",
       id: "add-task",
     });
+    this.zone = button("+ Zone", "New zone: then click its corners", "z", () => this.draw(), {
+      "aria-pressed": "false",
+      id: "add-zone",
+    });
     this.lists = button("Lists", "Planned and flown lists on the map", "l", () => this.nextLists());
     this.ground = button(
       "Earth",
@@ -33,6 +37,7 @@ export class MapTools {
     );
     byId("map-tools").append(
       this.add,
+      this.zone,
       this.lists,
       this.ground,
       button("Fit", "Show the whole mission", "f", () => map.fit()),
@@ -43,10 +48,14 @@ export class MapTools {
         button("−", "Zoom out", null, () => map.zoom(-1), { "aria-label": "Zoom out" }),
       ),
     );
+    this.done = make("button", { type: "button", hidden: true, click: () => this.closed() }, "Done");
     byId("placing").append(
       make("span", {}),
+      this.done,
       make("button", { type: "button", click: () => this.leave() }, "Cancel"),
     );
+    /** Corners of the zone that is being drawn; null while none is. */
+    this.corners = null;
     this.where = "";
   }
 
@@ -54,6 +63,8 @@ export class MapTools {
     const { head, mission } = this.picture;
     this.add.hidden = !this.operator.able || !mission;
     this.add.disabled = Boolean(head?.aborted || head?.phase === "ended");
+    this.zone.hidden = this.add.hidden;
+    this.zone.disabled = this.add.disabled;
     this.ground.hidden = !this.map.hasEarth;
     setText(
       this.lists,
@@ -76,8 +87,36 @@ export class MapTools {
     return was;
   }
 
-  /** Takes the place of a new task. */
+  /** Begins to draw a zone, or leaves off. */
+  draw() {
+    if (this.zone.hidden || this.zone.disabled) return;
+    if (this.map.isPlacing) this.leave();
+    else this.#mode(true, []);
+  }
+
+  /** A place was entered by the keyboard: of a zone, with corners enough, it is complete. */
+  entered(position) {
+    if (this.corners && this.corners.length >= 3) this.closed();
+    else this.placed(position);
+  }
+
+  /** The zone has all its corners. */
+  closed() {
+    const { corners } = this;
+    if (!corners || corners.length < 3) return;
+    this.#mode(false);
+    this.map.outline(corners);
+    this.operator.addZone(corners)?.then(() => this.map.outline([]));
+  }
+
+  /** Takes the place of a new task, or the next corner of a zone. */
   placed(position) {
+    if (this.corners) {
+      this.corners.push(position);
+      this.map.outline(this.corners);
+      this.#say();
+      return;
+    }
     this.#mode(false);
     this.operator.expect({ position, label: "new task" });
     this.operator.addTask(position)?.then((n) => n === null && this.operator.expect());
@@ -106,14 +145,31 @@ export class MapTools {
     setAttribute(this.ground, "aria-pressed", String(onEarth));
   }
 
-  #mode(on) {
+  /** Begins or ends to take places; `corners` are those of a zone, null of a task. */
+  #mode(on, corners = null) {
     this.map.placing = on;
-    setAttribute(this.add, "aria-pressed", String(on));
+    this.corners = corners;
+    this.map.outline([]);
+    setAttribute(this.add, "aria-pressed", String(on && !corners));
+    setAttribute(this.zone, "aria-pressed", String(on && Boolean(corners)));
     byId("placing").hidden = !on;
-    setText(
-      byId("placing").firstChild,
-      on ? "Click the place of the new task, or bring it under the cross and press Enter." : "",
-    );
+    this.#say();
     if (on) byId("map").focus({ preventScroll: true });
+  }
+
+  /** Says what the next click is taken for. */
+  #say() {
+    const { corners } = this;
+    this.done.hidden = !corners;
+    this.done.disabled = (corners?.length ?? 0) < 3;
+    let text = "";
+    if (corners)
+      text =
+        corners.length < 3
+          ? `Click the corners of the zone: ${corners.length} so far.`
+          : `${corners.length} corners: more, or Done (Enter).`;
+    else if (this.map.isPlacing)
+      text = "Click the place of the new task, or bring it under the cross and press Enter.";
+    setText(byId("placing").firstChild, text);
   }
 }

@@ -19,6 +19,11 @@ const COMMANDS = {
     confirm: "Hold",
   },
   resume: { title: (uav) => `Let ${uav} go on?`, text: "It takes tasks again.", confirm: "Resume" },
+  ready: {
+    title: (uav) => `May ${uav} start again?`,
+    text: "Its battery has been changed and nobody stands near: it arms and takes off by itself.",
+    confirm: "It is ready",
+  },
   return: {
     title: (uav) => `Send ${uav} home?`,
     text: "It gives its task up, flies home and takes no further part in this mission.",
@@ -34,7 +39,8 @@ export class Operator {
     this.sent = new Map();
     this.list = make("ol", { class: "log commands", "aria-label": "Commands, newest first" });
     this.empty = make("p", { class: "empty" }, "No command has been given from here.");
-    this.buttons = make("div", { class: "filters" });
+    this.buttons = make("div", { class: "filters", role: "group", "aria-label": "Zones" });
+    this.zonesShown = "";
     panel.append(this.buttons, make("div", { class: "scroller" }, this.list, this.empty));
     byId("abort").addEventListener("click", () => this.abort());
   }
@@ -45,6 +51,7 @@ export class Operator {
   }
 
   show(changed) {
+    this.#zones();
     if (changed.hello) this.renewed = true;
     if (changed.whole && this.renewed && !changed.again) {
       this.renewed = false;
@@ -64,7 +71,7 @@ export class Operator {
       title: title(uav),
       text,
       confirm,
-      danger: kind === "return",
+      danger: kind === "return" || kind === "ready",
       fields: [field("Reason (optional)", reasonField())],
       send: (form) =>
         this.#post(
@@ -155,6 +162,91 @@ export class Operator {
         });
       },
     });
+  }
+
+  /** Asks what zone is wanted round those corners, and draws it. */
+  addZone(corners) {
+    let free = 1;
+    while (this.picture.zones.has(`zone-${free}`)) free += 1;
+    const height = (name) =>
+      make("input", { name, type: "number", step: "any", placeholder: "no limit" });
+    return this.#ask({
+      title: "New zone",
+      text: "Nobody may fly there from now on: who is in it leaves by the shortest way, tasks in it are out of reach.",
+      confirm: "Draw zone",
+      danger: true,
+      fields: [
+        field(
+          "Id",
+          make("input", {
+            name: "id",
+            required: true,
+            maxlength: "64",
+            pattern: "[A-Za-z0-9][A-Za-z0-9_.\\-]*",
+            value: `zone-${free}`,
+            autocomplete: "off",
+          }),
+        ),
+        make("p", { class: "fine" }, `${corners.length} corners`),
+        make(
+          "div",
+          { class: "row" },
+          field("From height [m]", height("floor")),
+          field("To height [m]", height("ceiling")),
+        ),
+        make(
+          "label",
+          { class: "check" },
+          make("input", { type: "checkbox", name: "inclusive" }),
+          "The only place where to fly: keep inside",
+        ),
+        field("Reason (optional)", reasonField()),
+      ],
+      send: (form) => {
+        const limit = (name) => (form.get(name) === "" ? null : Number(form.get(name)));
+        const body = {
+          id: form.get("id").trim(),
+          polygon: corners.map(([east, north]) => [east, north]),
+          floor_m: limit("floor"),
+          ceiling_m: limit("ceiling"),
+          inclusive: form.get("inclusive") !== null,
+          reason: form.get("reason").trim(),
+        };
+        return this.#post("api/zone", body, `draw zone ${body.id}`);
+      },
+    });
+  }
+
+  removeZone(zone) {
+    return this.#ask({
+      title: `Take zone ${zone} away?`,
+      text: "The fleet may fly there again.",
+      confirm: "Take away",
+      danger: true,
+      fields: [field("Reason (optional)", reasonField())],
+      send: (form) =>
+        this.#post(
+          "api/zone/remove",
+          { id: zone, reason: form.get("reason").trim() },
+          `take zone ${zone} away`,
+        ),
+    });
+  }
+
+  /** A button for each zone that holds. */
+  #zones() {
+    const names = this.able ? this.picture.zonesInForce.map((zone) => zone.id) : [];
+    if (names.join(" ") === this.zonesShown) return;
+    this.zonesShown = names.join(" ");
+    this.buttons.replaceChildren(
+      ...names.map((name) =>
+        make(
+          "button",
+          { type: "button", class: "pill", title: "Take it away", click: () => this.removeZone(name) },
+          `Zone ${name} ×`,
+        ),
+      ),
+    );
   }
 
   withdraw(task) {

@@ -34,9 +34,94 @@ export function taskRadius(value, look) {
 export function paintGround(canvas, view, picture, motion, look, spots) {
   canvas.clearRect(0, 0, view.width, view.height);
   if (look.grid) paintGrid(canvas, view, look);
+  for (const zone of picture.zonesInForce) paintZone(canvas, view, zone, look);
+  paintLines(canvas, view, picture, look);
   paintLists(canvas, view, picture, motion, look);
   paintTrails(canvas, view, picture, motion, look);
+  for (const base of picture.mission?.bases ?? []) paintBase(canvas, view, base, look);
   paintTasks(canvas, view, picture, look, spots);
+  paintOutline(canvas, view, look);
+}
+
+/** A zone: hatched inside where nobody may fly; of one to keep inside, only the border. */
+function paintZone(canvas, view, zone, look) {
+  const { ink } = look;
+  canvas.save();
+  canvas.beginPath();
+  for (const ring of [zone.polygon, ...zone.holes]) {
+    ring.forEach((corner, index) => canvas[index ? "lineTo" : "moveTo"](...view.spot(corner)));
+    canvas.closePath();
+  }
+  canvas.strokeStyle = ink.trouble;
+  canvas.lineWidth = 1.5;
+  canvas.setLineDash(zone.inclusive ? [10, 5] : []);
+  canvas.stroke();
+  if (!zone.inclusive) {
+    canvas.clip("evenodd");
+    hatch(canvas, zone.polygon.map((corner) => view.spot(corner)), view);
+  }
+  canvas.restore();
+  canvas.font = `italic 11px ${ink.font}`;
+  canvas.textAlign = "center";
+  const spots = zone.polygon.map((corner) => view.spot(corner));
+  const [x, y] = [0, 1].map((axis) => spots.reduce((sum, spot) => sum + spot[axis], 0) / spots.length);
+  label(canvas, zone.id, x, y + 4, ink.trouble, look);
+}
+
+/** Slanting lines over what of those spots is in view; whoever calls has clipped. */
+function hatch(canvas, spots, view) {
+  const [xs, ys] = [spots.map(([x]) => x), spots.map(([, y]) => y)];
+  const [left, right] = [Math.max(-20, Math.min(...xs)), Math.min(view.width + 20, Math.max(...xs))];
+  const [top, bottom] = [Math.max(-20, Math.min(...ys)), Math.min(view.height + 20, Math.max(...ys))];
+  canvas.globalAlpha = 0.4;
+  canvas.lineWidth = 1;
+  canvas.setLineDash([]);
+  canvas.beginPath();
+  const first = Math.floor((left + top) / 9) * 9;
+  for (let sum = first; sum < right + bottom; sum += 9) {
+    canvas.moveTo(sum - top, top);
+    canvas.lineTo(sum - bottom, bottom);
+  }
+  canvas.stroke();
+  canvas.globalAlpha = 1;
+}
+
+/** Tasks that are lines. */
+function paintLines(canvas, view, picture, look) {
+  canvas.strokeStyle = look.ink.muted;
+  canvas.lineWidth = 2;
+  for (const task of picture.tasks.values())
+    if (task.path?.length && task.state !== "withdrawn") path(canvas, view, task.path);
+}
+
+function paintBase(canvas, view, base, look) {
+  const spot = view.spot(base.position);
+  if (!view.holds(spot)) return;
+  const [x, y] = spot;
+  canvas.fillStyle = look.ink.ground;
+  canvas.strokeStyle = look.ink.text;
+  canvas.lineWidth = 2;
+  canvas.fillRect(x - 9, y - 9, 18, 18);
+  canvas.strokeRect(x - 9, y - 9, 18, 18);
+  canvas.font = `11px ${look.ink.font}`;
+  canvas.textAlign = "center";
+  label(canvas, base.id, x, y + 22, look.ink.text, look);
+}
+
+/** The zone that is being drawn, as far as it is. */
+function paintOutline(canvas, view, look) {
+  if (!look.corners.length) return;
+  const { accent } = look.ink;
+  canvas.strokeStyle = accent;
+  canvas.fillStyle = accent;
+  canvas.lineWidth = 2;
+  canvas.setLineDash([5, 4]);
+  path(canvas, view, [...look.corners, look.corners[0]]);
+  canvas.setLineDash([]);
+  for (const corner of look.corners) {
+    const [x, y] = view.spot(corner);
+    canvas.fillRect(x - 4, y - 4, 8, 8);
+  }
 }
 
 /** A round distance of at least `metres`. */
@@ -282,7 +367,8 @@ function paintLabels(canvas, labels, look, always) {
 
 /** Id, target and rule of the UAV that is selected. */
 function told(row, picture) {
-  const target = row.task ? ` → ${row.task}` : ` ${row.does}`;
+  const goal = row.task ?? row.base;
+  const target = goal ? ` → ${goal}` : ` ${row.does}`;
   return `${row.id}${target}${picture.head.rule ? ` · ${picture.head.rule}` : ""}`;
 }
 

@@ -16,6 +16,7 @@ function changes(whole = false) {
     uavs: new Set(),
     tasks: new Set(),
     lists: new Set(),
+    zones: new Set(),
     commands: new Set(),
     story: [],
     choices: [],
@@ -37,6 +38,7 @@ export class Picture {
     this.uavs = new Map();
     this.tasks = new Map();
     this.lists = new Map();
+    this.zones = new Map();
     this.commands = new Map();
     this.story = [];
     this.choices = [];
@@ -68,6 +70,13 @@ export class Picture {
     }
   }
 
+  /** Zones that hold, in the order people count. */
+  get zonesInForce() {
+    return [...this.zones.values()]
+      .filter((zone) => !zone.withdrawn)
+      .sort((one, other) => byName(one.id, other.id));
+  }
+
   /** What the fleet's description says of a UAV. */
   described(id) {
     return this.byId?.get(id) ?? { id, short: id, number: 0, start: null, speed_m_s: null, kind: null };
@@ -86,7 +95,7 @@ export class Picture {
   #takeFrame(frame) {
     const changed = changes(frame.whole);
     if (frame.whole) this.forget();
-    const { uavs, tasks, lists, commands, story, choices, objective_curve: curve, ...head } = frame;
+    const { uavs, tasks, lists, zones, commands, story, choices, objective_curve: curve, ...head } = frame;
     this.head = head;
     for (const row of uavs ?? []) {
       this.uavs.set(row.id, row);
@@ -100,6 +109,10 @@ export class Picture {
     for (const row of lists ?? []) {
       this.lists.set(row.uav, row);
       changed.lists.add(row.uav);
+    }
+    for (const row of zones ?? []) {
+      this.zones.set(row.id, row);
+      changed.zones.add(row.id);
     }
     for (const row of commands ?? []) {
       this.commands.set(row.n, row);

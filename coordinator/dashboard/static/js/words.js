@@ -4,6 +4,11 @@ export const NOTHING = "–";
 
 /** What a UAV does: its sign, and whether that is trouble, activity or rest. */
 export const DOES = {
+  "to base": ["▲", "busy"],
+  waiting: ["△", "held"],
+  swapping: ["▣", "busy"],
+  "at base": ["□", "rest"],
+  parked: ["□", "rest"],
   starting: ["◌", "rest"],
   learning: ["◌", "rest"],
   preparing: ["◌", "rest"],
