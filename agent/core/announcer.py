@@ -10,7 +10,7 @@ from swarm.protocol.messages import REVOKED_INCARNATION, Body, Message
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing, earliest
-from swarm.protocol.uav_messages import Claim, Outcome, Status
+from swarm.protocol.uav_messages import Calibration, Claim, Outcome, Status
 
 _LONGEST_NOTE = 200
 """Characters of a status's note; an autopilot's words may be longer."""
@@ -74,7 +74,7 @@ class Announcer:
     def hear_echo(self, message: Message) -> list[Publish]:
         """Learn what others remember of this writer: it must never say less than that."""
         outdone = self._register_writer.observe(message.stamp)
-        if isinstance(message.body, Outcome):
+        if isinstance(message.body, Outcome | Calibration):
             self._replica.join(message)
             return []
         said = self._replica.known(message)
@@ -89,7 +89,7 @@ class Announcer:
         Outcomes take turns, so that the bus stays quiet however many there are.
         """
         own = list(self._replica.messages({self._register_writer.writer}))
-        said = [message for message in own if isinstance(message.body, Claim)]
+        said = [message for message in own if isinstance(message.body, Claim | Calibration)]
         outcomes = [message for message in own if isinstance(message.body, Outcome)]
         for _ in range(min(_OUTCOMES_AT_ONCE, len(outcomes))):
             self._turn = (self._turn + 1) % len(outcomes)

@@ -27,6 +27,8 @@ class SortieClock:
         """By the time since take-off [s]; None before the first one of this life."""
         self._measured_s = math.inf
         """By the charge that the vehicle told last [s]."""
+        self._drain_frac = 1.0
+        """Multiple of the charge that a second in the air should take."""
 
     @property
     def end_s(self) -> float:
@@ -48,7 +50,7 @@ class SortieClock:
         Who is in the air before the mission begins counts from mission time 0.
         """
         if self._counted_s is None:
-            self._counted_s = mission_s + _budget_s(me, me.charge_frac)
+            self._counted_s = mission_s + _budget_s(me, me.charge_frac) / self._drain_frac
 
     def recall(self, sortie_end_s: float | None) -> None:
         """An earlier life of this agent said so; nothing of one that ended on the ground."""
@@ -57,18 +59,27 @@ class SortieClock:
 
     def depart(self, me: UavSpec, mission_s: float) -> None:
         """It takes off with a full battery."""
-        self._counted_s, self._measured_s = mission_s + _budget_s(me, 1.0), math.inf
+        budget_s = _budget_s(me, 1.0) / self._drain_frac
+        self._counted_s, self._measured_s = mission_s + budget_s, math.inf
 
     def land(self) -> None:
         """It stands at a base: nothing is used up."""
         self._counted_s, self._measured_s = math.inf, math.inf
+
+    def heed(self, drain_frac: float, mission_s: float) -> None:
+        """Its battery is found to drain so many times as fast as it should."""
+        before, self._drain_frac = self._drain_frac, drain_frac
+        if before != drain_frac and self._counted_s is not None:
+            left_s = self._counted_s - mission_s
+            self._counted_s = mission_s + left_s * before / drain_frac
 
     def measure(self, me: UavSpec, battery_frac: float | None, mission_s: float) -> bool:
         """Its vehicle has told its charge; whether the sortie ends earlier than was known."""
         if me.endurance_s is None or battery_frac is None or self._counted_s == math.inf:
             return False
         before_s = self.end_s
-        self._measured_s = mission_s + (battery_frac - me.reserve_frac) * me.endurance_s
+        left_s = (battery_frac - me.reserve_frac) * me.endurance_s
+        self._measured_s = mission_s + left_s / self._drain_frac
         return self.end_s < before_s - TOLERANCE_S
 
 

@@ -60,6 +60,11 @@ class FieldTasking(Tasking):
 
     def begin(self, now_s: float) -> None:
         """The vehicle takes targets: as in a plain mission, or on to an earlier life's base."""
+        if self._machine.state is AgentState.RESUMING:  # it may fly still
+            self._flights.meter.land()
+        else:
+            self._flights.meter.hover()
+        self._sortie.heed(self._flights.meter.rates.drain_frac, self._mission_view.mission_s(now_s))
         me, claim = self._mission_view.me, self._replica.claims.get(self._uav)
         self._visits.leave_ground()
         if me is not None:
@@ -106,6 +111,8 @@ class FieldTasking(Tasking):
 
     def arrive(self, leg: int, now_s: float) -> None:
         """The vehicle is where that leg ends."""
+        if leg == self._flights.leg and self._flights.meter.arrive(leg):
+            self._heed_rates(now_s)
         problem, state = self._flights.problem, self._machine.state
         if problem is None:
             super().arrive(leg, now_s)
@@ -161,8 +168,21 @@ class FieldTasking(Tasking):
             return False
         mission_s = self._mission_view.mission_s(now_s)
         if self._mission_view.running:
+            meter = self._flights.meter
+            if meter.measure(me.endurance_s, telemetry.battery_frac, now_s):
+                self._heed_rates(now_s)
             self._drained |= self._sortie.measure(me, telemetry.battery_frac, mission_s)
         return self._drained
+
+    def keep_time(self, now_s: float) -> None:
+        """A step begins."""
+        self._flights.meter.now_s = now_s
+
+    def _heed_rates(self, now_s: float) -> None:
+        """It flies otherwise than was known: what is under way may not end in time any more."""
+        drain_frac = self._flights.meter.rates.drain_frac
+        self._sortie.heed(drain_frac, self._mission_view.mission_s(now_s))
+        self._drained = True
 
     def advance_in_field(self, now_s: float) -> None:
         """What follows from constraints and the time, in a running mission, before `advance`."""

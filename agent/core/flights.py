@@ -6,13 +6,18 @@ decisions are made, so a UAV flies what it reckoned with. Leaves out: why it fli
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
+import numpy as np
+
+from agent.core.calibration import FlightMeter
 from agent.core.context import AgentContext, AgentPart
 from agent.core.interface import GoTo, Ready, Return, Swap
 from agent.core.path_clearance import PathClearance
 from swarm.allocation.field import FieldProblem
 from swarm.allocation.field.ways import Way, base_node, task_nodes, way_home, way_to
+from swarm.allocation.problem import rest_to_rest_s
 from swarm.model import TaskId, UavId
 from swarm.protocol.field_messages import BaseSpec, ZoneSpec
 from swarm.protocol.fields import Point
@@ -40,6 +45,8 @@ class Flights(AgentPart):
         super().__init__(context)
         self.leg = 0
         """Number of the last order to fly somewhere; what the vehicle says of others is late."""
+        self.meter = FlightMeter(context)
+        """Is told of every leg."""
         self._zones: tuple[ZoneSpec, ...] = ()
         self._home: HomeFlight | None = None
         self._home_from: object = None
@@ -105,9 +112,9 @@ class Flights(AgentPart):
         problem, place_enu_m = self.problem, self._mission_view.place_enu_m
         if problem is None or place_enu_m is None:
             return None
-        if self._home_from != (place_enu_m, id(problem)):
+        if self._home_from != (place_enu_m, problem):
             way = self._widened(way_home(problem, self._row(problem), place_enu_m))
-            self._home_from = place_enu_m, id(problem)
+            self._home_from = place_enu_m, problem
             self._home = (
                 None
                 if way is None
@@ -155,6 +162,7 @@ class Flights(AgentPart):
     def to_task(self, task: TaskEntry, attempt: int, *, idled: bool = False) -> None:
         """Fly straight to a task, and stay as long as its service takes."""
         self.leg += 1
+        self.meter.depart(self.leg, self._straight_s(task.position_enu_m))
         place_enu_m = self._mission_view.in_layer(task.position_enu_m)
         self._order(GoTo(self.leg, place_enu_m, task.service_s, idled, task.task, attempt))
 
@@ -163,6 +171,7 @@ class Flights(AgentPart):
     ) -> None:
         """Fly that way, to a task or above a base."""
         self.leg += 1
+        self.meter.depart(self.leg, way.duration_s / self._time_frac())
         name = None if task is None else task.task
         via_enu_m = way.via_enu_m
         self._order(
@@ -174,10 +183,27 @@ class Flights(AgentPart):
         points = task.path_enu_m[::-1] if backwards else task.path_enu_m
         flown = [self._flown(task, point) for point in points]
         self.leg += 1
+        line_s = self.line_s(task.task, backwards=backwards)
+        self.meter.depart(self.leg, line_s / self._time_frac())
         via_enu_m = tuple(flown[1:-1])
         order = GoTo(self.leg, flown[-1], task.service_s, False, task.task, attempt, via_enu_m)
         self._order(order)
         return points[-1]
+
+    def _time_frac(self) -> float:
+        """Of its times as the brief has them, what ways take by the problem."""
+        problem = self.problem
+        if problem is None or problem.network is None:
+            return 1.0
+        return float(problem.network.time_frac[self._row(problem)])
+
+    def _straight_s(self, stop_enu_m: Point) -> float | None:
+        """Time of a straight leg from where the UAV is, by the brief [s]; None: nobody can tell."""
+        me, place_enu_m = self._mission_view.me, self._mission_view.place_enu_m
+        if me is None or place_enu_m is None or me.acceleration_m_s2 is None:
+            return None
+        length_m = np.array([math.dist(place_enu_m, stop_enu_m)])
+        return float(rest_to_rest_s(length_m, me.speed_m_s, me.acceleration_m_s2)[0])
 
     def _flown(self, task: TaskEntry, point: Point) -> Point:
         if task.height_m is not None:
@@ -189,11 +215,13 @@ class Flights(AgentPart):
         telemetry = self._mission_view.telemetry
         if telemetry is not None:
             self.leg += 1
+            self.meter.depart(self.leg)
             self._order(GoTo(self.leg, self.way_out() or telemetry.position_enu_m))
 
     def swap(self, base: BaseSpec) -> None:
         """Land at a base, and get another battery."""
         self.leg += 1
+        self.meter.land()
         me = self._mission_view.me
         speed_m_s = None if me is None else me.speed_m_s
         self._order(Swap(self.leg, base.position_enu_m, base.swap_s, speed_m_s))
@@ -204,6 +232,7 @@ class Flights(AgentPart):
 
     def land_beside(self, base: BaseSpec) -> None:
         """Land at a base without taking any of its slots."""
+        self.meter.land()
         self.leg += 1  # nothing is heard any more of how it came there
         above_enu_m = self._mission_view.in_layer(base.position_enu_m)
         reason = f"its battery is used up, and no slot of base {base.id} is free"

@@ -42,7 +42,7 @@ from swarm.protocol.messages import (
     TaskEdit,
     TaskEntry,
 )
-from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
+from swarm.protocol.uav_messages import Calibration, Choice, Claim, Outcome, Status
 
 FORMAT: Final = "1"
 """Version of all schemas here; grows when what was written before cannot be read any more."""
@@ -53,6 +53,7 @@ _BODIES: Final[dict[str, type[Body]]] = {
     "Board": TaskEntry,
     "Claim": Claim,
     "Outcome": Outcome,
+    "Calibration": Calibration,
     "Status": Status,
     "Choice": Choice,
     "Command": OperatorCommand,

@@ -20,6 +20,12 @@ from swarm.allocation.problem import BoolArray, Problem
 from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.model.mission import PLAIN_CONSTRAINTS
+from swarm.protocol.calibration import (
+    FlightRates,
+    field_as_flown,
+    fleet_as_flown,
+    flight_rates,
+)
 from swarm.protocol.encoding import FIELD_DEFAULTS
 from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import MissionConfig, PostedTask, TaskEntry, UavSpec
@@ -107,8 +113,11 @@ class TaskBoard:
         """Of these, tasks that a plain problem does not tell all of."""
         self._mission: Mission | None = None
         self._mission_version = -1
+        self._field_briefed: FieldProblem | None = None
+        """As the brief has its UAVs."""
         self._field_problem: FieldProblem | None = None
         self._field_version = -1
+        self._field_rates: dict[str, FlightRates] = {}
         self._states: dict[str, TaskState] = {}
         self._unfinished = False
         self._basis: tuple[int, int] | None = None
@@ -119,7 +128,11 @@ class TaskBoard:
         """Of the problem."""
         self._fleet_of_problem: Mission | None = None
         self._problem: Problem | None = None
-        self._problem_version = -1
+        self._problem_version = -1, -1
+        self._rates: dict[str, FlightRates] = {}
+        self._rates_version = -1, -1
+        self._flown: tuple[Mission, dict[str, FlightRates], Mission] | None = None
+        """The fleet, its rates, and what comes of both."""
 
     @property
     def states(self) -> dict[str, TaskState]:
@@ -135,13 +148,14 @@ class TaskBoard:
 
     @property
     def problem(self) -> Problem | None:
-        """Every UAV of the brief and every task posted so far; None before the brief.
+        """Every UAV of the brief, as it flies, and every task posted so far; None before the brief.
 
         Times of its legs hold where there is no `field_problem`.
         """
-        if self._problem_version != self.replica.board_version:
+        version = self.replica.board_version, self.replica.calibration_version
+        if self._problem_version != version:
             self._problem = self._problem_now()
-            self._problem_version = self.replica.board_version
+            self._problem_version = version
         return self._problem
 
     @property
@@ -160,11 +174,22 @@ class TaskBoard:
 
     @property
     def field_problem(self) -> FieldProblem | None:
-        """Of `mission`, each UAV in its layer of the brief; None where `problem` tells all."""
+        """Of `mission`, each UAV as it flies, in its layer; None where `problem` tells all."""
+        briefed, rates = self._field_briefed, self.rates
         if self._field_version != self.replica.board_version:
-            self._field_problem = self._field_problem_now()
-            self._field_version = self.replica.board_version
+            briefed = self._field_briefed = self._field_problem_now()
+            self._field_version, self._field_problem = self.replica.board_version, None
+        if briefed is not None and (self._field_problem is None or self._field_rates != rates):
+            self._field_problem, self._field_rates = field_as_flown(briefed, rates), rates
         return self._field_problem
+
+    @property
+    def rates(self) -> dict[str, FlightRates]:
+        """Of UAVs that fly otherwise than the brief says, how they do; by id."""
+        version = self.replica.board_version, self.replica.calibration_version
+        if self._rates_version != version:
+            self._rates, self._rates_version = flight_rates(self.replica), version
+        return self._rates
 
     def _field_problem_now(self) -> FieldProblem | None:
         fleet, tasks = self._fleet_now(), self._tasks_now()
@@ -180,7 +205,7 @@ class TaskBoard:
 
     def _problem_now(self) -> Problem | None:
         """Of `mission_of`; what nothing new was said of is not made anew."""
-        known, fleet = self._problem, self._fleet_now()
+        known, fleet = self._problem, self._fleet_as_flown()
         if fleet is None:
             return None
         tasks = self._tasks_now()
@@ -191,6 +216,15 @@ class TaskBoard:
         if before is None:
             return Problem.from_mission(fleet, tasks=tasks)
         return before.with_tasks(fleet, tasks, columns)
+
+    def _fleet_as_flown(self) -> Mission | None:
+        """The same object as long as nothing has changed that concerns it."""
+        fleet, rates = self._fleet_now(), self.rates
+        if fleet is None or not rates:
+            return fleet
+        if self._flown is None or self._flown[0] is not fleet or self._flown[1] != rates:
+            self._flown = fleet, rates, fleet_as_flown(fleet, rates)
+        return self._flown[2]
 
     def _fleet_now(self) -> Mission | None:
         """The mission without tasks and zones, made once per brief; None before the brief."""

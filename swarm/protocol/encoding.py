@@ -32,7 +32,15 @@ from swarm.protocol.messages import (
     UavSpec,
 )
 from swarm.protocol.seal import UnacceptableError
-from swarm.protocol.uav_messages import Candidate, Choice, ChoiceBasis, Claim, Outcome, Status
+from swarm.protocol.uav_messages import (
+    Calibration,
+    Candidate,
+    Choice,
+    ChoiceBasis,
+    Claim,
+    Outcome,
+    Status,
+)
 
 SMALL_LIMIT_BYTES: Final = 4 * 1024
 LARGE_LIMIT_BYTES: Final = 1024 * 1024
@@ -44,6 +52,7 @@ KINDS: Final[dict[str, type[Body]]] = {
     "board": TaskEntry,
     "claim": Claim,
     "outcome": Outcome,
+    "calibration": Calibration,
     "status": Status,
     "choice": Choice,
     "command": OperatorCommand,

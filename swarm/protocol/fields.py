@@ -33,6 +33,7 @@ Probability = Annotated[float, Strict(), Ge(0.0), Le(1.0)]
 Count = Annotated[int, Strict(), Ge(0), Le(MAX_COUNT)]
 Reason = Annotated[str, Strict(), Len(1, 40)]
 Words = Annotated[str, Strict(), Len(0, 200)]
+Factor = Annotated[float, Strict(), Ge(1e-3), Le(1e3)]
 Score = Annotated[float, Strict(), Ge(-1e30), Le(1e30)]
 
 

@@ -72,6 +72,10 @@ class KeySpace:
         """How a UAV's attempt at a task ended; ``*`` for all."""
         return f"{self.root}/uav/{uav}/outcome/{task}"
 
+    def calibration(self, uav: str) -> str:
+        """How a UAV flies, by what was measured; ``*`` for all."""
+        return f"{self.root}/uav/{uav}/calibration"
+
     def status(self, uav: str) -> str:
         """Where a UAV is and how it does; ``*`` for all."""
         return f"{self.root}/uav/{uav}/status"

@@ -40,7 +40,7 @@ from swarm.protocol.fields import (
     Words,
 )
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
+from swarm.protocol.uav_messages import Calibration, Choice, Claim, Outcome, Status
 
 SCHEMA_VERSION = 1
 """Grows only with what releases before cannot be mixed with; see swarm.protocol.codec."""
@@ -265,6 +265,7 @@ Body = (
     | TaskEntry
     | Claim
     | Outcome
+    | Calibration
     | Status
     | Choice
     | OperatorCommand
@@ -354,6 +355,8 @@ def _key_of(mission: str, writer: str, body: Body) -> str:
             return keys.claim(writer)
         case Outcome(task=task):
             return keys.outcome(writer, task)
+        case Calibration():
+            return keys.calibration(writer)
         case Status():
             return keys.status(writer)
         case Choice():

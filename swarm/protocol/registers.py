@@ -32,7 +32,7 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.seal import open_envelope
 from swarm.protocol.sync import fingerprint
-from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
+from swarm.protocol.uav_messages import Calibration, Choice, Claim, Outcome, Status
 
 # A bus without keys lets anybody make names up: they must not cost memory without end.
 MOST_UNPOSTED: Final = 1000
@@ -76,6 +76,8 @@ class Replica:
         self.outcomes: dict[tuple[str, str], Outcome] = {}
         """By UAV id and task id, of those in the brief likewise; as long as neither `board_version`
         nor `reattempts` grows, further ones come at the end."""
+        self.calibrations: dict[str, Calibration] = {}
+        """By UAV id, how those in the brief fly, likewise."""
         self._fleet: set[str] | None = None
         self.commands: dict[str, tuple[Stamp, OperatorCommand]] = {}
         """By target, those for other flights of the mission among them.
@@ -99,6 +101,8 @@ class Replica:
         """Grows with every change of brief or board."""
         self.task_version = 0
         """Grows with every change of brief, board or outcomes."""
+        self.calibration_version = 0
+        """Grows with every change of how UAVs of the brief fly."""
         self.reattempts = 0
         """Outcomes that have taken the place of others, of those that count."""
         self._ordered: dict[str, tuple[TaskEdit, TaskEntry]] = {}
@@ -136,7 +140,7 @@ class Replica:
             case TaskEdit(task=task) as order:
                 self.task_orders[task] = order
                 self._settle(task)
-            case Claim() | Outcome() if self._takes_part(message.writer):
+            case Claim() | Outcome() | Calibration() if self._takes_part(message.writer):
                 self._note(message)
             case OperatorCommand(target=target) as command:
                 self.commands[target] = message.stamp, command
@@ -173,7 +177,7 @@ class Replica:
     def _is_strange(self, message: Message) -> bool:
         """Whether it is about a UAV that is not known to take part."""
         match message.body:
-            case Claim() | Outcome():
+            case Claim() | Outcome() | Calibration():
                 name = message.writer
             case OperatorCommand(target=target) if target != FLEET:
                 name = target
@@ -241,6 +245,8 @@ class Replica:
             self._forget_strangers()
             self.claims.clear()
             self.outcomes.clear()
+            self.calibrations.clear()
+            self.calibration_version += 1
             for message in self._registers.values():
                 if self._takes_part(message.writer):
                     self._note(message)
@@ -260,13 +266,16 @@ class Replica:
         return self._fleet is None or writer in self._fleet
 
     def _note(self, message: Message) -> None:
-        """What a UAV that takes part claims, or has done."""
+        """What a UAV that takes part claims, or has done, or how it flies."""
         match message.body:
             case Claim() as claim:
                 self.claims[message.writer] = claim
             case Outcome(task=task) as outcome:
                 self.reattempts += (message.writer, task) in self.outcomes
                 self.outcomes[message.writer, task] = outcome
+            case Calibration() as calibration:
+                self.calibration_version += self.calibrations.get(message.writer) != calibration
+                self.calibrations[message.writer] = calibration
             case _:
                 pass
 

@@ -20,6 +20,7 @@ from swarm.protocol.fields import (
     Checked,
     Count,
     Duration,
+    Factor,
     Flag,
     Id,
     Instant,
@@ -210,6 +211,21 @@ class Outcome(Checked):
     """Mission time [s]."""
     reversed: Flag | None = None
     """The task, a line, was flown from its last point to its first; None of a place."""
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration(Checked):
+    """Register ``uav/<id>/calibration``: how this UAV flies, by what was measured in flight.
+
+    As multiples of what the brief says; see swarm.protocol.calibration.
+    """
+
+    time_frac: Factor
+    """Of the times of its legs: 1.2 takes a fifth longer."""
+    drain_frac: Factor
+    """Of the charge that a second in the air takes: 1.25 is empty a fifth earlier."""
+    legs: Count
+    """How many legs that rests on."""
 
 
 class StatusPhase(StrEnum):

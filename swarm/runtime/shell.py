@@ -385,6 +385,7 @@ def join_mission(
         keys.board("*"),
         keys.claim("*"),
         keys.outcome("*", "*"),
+        keys.calibration("*"),
         keys.operator("*"),
         keys.operator_task("*"),
         keys.operator_start("*"),

@@ -7,6 +7,7 @@ Leaves out: the paths themselves and how long they take (swarm.allocation.legs).
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Sequence
 
 import numpy as np
@@ -98,6 +99,31 @@ class FieldNetwork:
             if self._airspace.zones:
                 self.line_s[row, self._cut_off(self._layers_m[kind.index(row)])] = np.inf
         self.home_s, self.home = self._homes(len(mission.bases))
+        self.time_frac: FloatArray = np.ones(len(uavs))
+        """(n_uav,) multiples of these times that are in the tables."""
+
+    def calibrated(self, time_frac: Sequence[float] | FloatArray) -> FieldNetwork:
+        """The same where legs and lines of each UAV take so many times as long.
+
+        Whatever fits no more, as UAVs that flew alike no longer do, stays as it is.
+
+        Args:
+            time_frac: (n_uav,) multiples of the times here; > 0.
+        """
+        fracs = np.asarray(time_frac, dtype=np.float64)
+        pairs = list(zip(self.kind.tolist(), fracs.tolist(), strict=True))
+        kinds = {pair: row for row, pair in enumerate(dict.fromkeys(pairs))}
+        if (fracs == 1.0).all() or len(kinds) * len(self.node_enu_m) ** 2 > MOST_LEGS:
+            return self
+        same = copy.copy(self)
+        rows, each = (np.array(column) for column in zip(*kinds, strict=True))
+        same.kind = np.array([kinds[pair] for pair in pairs], dtype=np.int32)
+        same.leg_s = self.leg_s[rows] * each[:, None, None]
+        same.line_s = self.line_s[rows] * each[:, None, None]
+        same.home_s = self.home_s * fracs[:, None]
+        same.time_frac = self.time_frac * fracs
+        same._kinds = [self._kinds[row] for row in rows.tolist()]  # noqa: SLF001 -- its own copy
+        return same
 
     def legs_from_s(
         self, uav: int, place_enu_m: Sequence[float] | FloatArray, flown_m: float | None = None
@@ -112,6 +138,7 @@ class FieldNetwork:
         model, network = self._kind_of(uav)
         place_m, low_m, high_m = self._placed(uav, place_enu_m, flown_m)
         times_s: FloatArray = network.legs_from(place_m, low_m, high_m).times_s(model)[0]
+        times_s *= self.time_frac[uav]
         return times_s
 
     def corners_m(self, uav: int, begin: int, end: int) -> FloatArray | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -183,6 +183,28 @@ class FieldProblem:
             full_s=_floats(_airborne_s(uav, 1.0) for uav in rows),
             swap_s=_floats(base.swap_s for base in mission.bases),
             slots=np.array([base.slots or 0 for base in mission.bases], dtype=np.int32),
+            network=network,
+        )
+
+    def calibrated(self, time_frac: Sequence[float], drain_frac: Sequence[float]) -> FieldProblem:
+        """The same for UAVs that fly otherwise than planned; itself if none does.
+
+        Args:
+            time_frac: (n_uav,) multiples of the times of legs and lines; > 0.
+            drain_frac: (n_uav,) multiples of the charge that a second in the air takes; > 0.
+        """
+        if all(frac == 1.0 for frac in (*time_frac, *drain_frac)):
+            return self
+        network = self._known_network().calibrated(time_frac)
+        drain = np.asarray(drain_frac, dtype=np.float64)
+        return replace(
+            self,
+            kind=network.kind,
+            leg_s=network.leg_s,
+            line_s=network.line_s,
+            home_s=network.home_s,
+            first_s=self.first_s / drain,
+            full_s=self.full_s / drain,
             network=network,
         )
 
