@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from swarm.model import Mission
 
 
-def _number(names: str, most: float, metavar: str, text: str) -> Any:
-    return option(None, *names.split(), min=0.0, max=most, metavar=metavar, help=text)
+def _number(names: str, most: float, metavar: str, text: str, least: float = 0.0) -> Any:
+    return option(None, *names.split(), min=least, max=most, metavar=metavar, help=text)
 
 
 def _switch(name: str, text: str) -> Any:
@@ -56,6 +56,20 @@ class ChanceOptions:
     )
     reattempt: bool | None = _switch(
         "reattempt", "Whether failed tasks open again, instead of what the scenario says."
+    )
+    speed_frac: float | None = _number(
+        "--speed-frac",
+        10.0,
+        "FRAC",
+        "Share of its cruise speed at which every UAV really flies. Default: 1.",
+        least=0.1,
+    )
+    drain_frac: float | None = _number(
+        "--drain-frac",
+        10.0,
+        "FRAC",
+        "How many times as fast as planned batteries really drain. Default: 1.",
+        least=0.1,
     )
     speed_sd_frac: float | None = _number(
         "--speed-sd",

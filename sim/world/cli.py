@@ -79,6 +79,7 @@ def simulate(
         swarm simulate valley-survey --method guided --loss 0.3 --coordinator-lost-s 0
         swarm simulate table-1 --outcomes --reattempt --seed 1
         swarm simulate valley-survey --speed-sd 0.1 --leg-sd 0.1 --wind 5
+        swarm simulate reservoir-inspection --speed-frac 0.8 --drain-frac 1.25
         swarm simulate valley-survey --message-loss 0.2 --delay-s 0.05 --jitter-s 0.05
         swarm simulate valley-survey --faults cut,crash --seed 7
         swarm simulate valley-survey --loss 0.3 --record flight.mcap

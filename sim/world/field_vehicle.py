@@ -83,6 +83,8 @@ class FieldVehicle:
         endurance_s, charge_frac = self._uav.endurance_s, self._uav.charge_frac
         self.battery = None if endurance_s is None else FlightBattery(endurance_s, charge_frac)
         """None for one without an end."""
+        if self.battery is not None and fate is not None:
+            self.battery.drain = fate.uncertainty.drain_frac
         self._mission_runs = False
         self._layer_m = 0.0
         self._start_enu_m = self._uav.position_enu_m

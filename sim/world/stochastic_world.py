@@ -264,7 +264,8 @@ def _troubled(fate: Realization) -> bool:
     """Whether anything can happen to a vehicle but its loss."""
     what = fate.uncertainty
     troubles = what.speed_sd_frac, what.leg_sd_frac, what.wind_m_s, what.position_error_m
-    return what.outcomes or any(troubles)
+    as_planned = what.speed_frac == what.drain_frac == 1.0
+    return what.outcomes or any(troubles) or not as_planned
 
 
 def _vehicle(

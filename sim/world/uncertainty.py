@@ -42,7 +42,8 @@ class Uncertainty:
     """How uncertain a mission is.
 
     Raises:
-        ValueError: a probability is outside 0..1, or another number is negative or not finite.
+        ValueError: a probability is outside 0..1, another number negative or not finite, or a
+            speed or drain zero.
     """
 
     loss: float = 0.0
@@ -57,6 +58,10 @@ class Uncertainty:
     """Whether attempts succeed or fail by chance; otherwise each is worth its p."""
     survival: bool = False
     """Whether tasks cost UAVs by chance; otherwise later tasks are worth their S."""
+    speed_frac: float = 1.0
+    """Share of its cruise speed at which every UAV really flies, on average; > 0."""
+    drain_frac: float = 1.0
+    """How many times as fast as they should batteries really drain; > 0."""
     speed_sd_frac: float = 0.0
     """Standard deviation of a UAV's speed, as a share of its cruise speed."""
     leg_sd_frac: float = 0.0
@@ -88,6 +93,9 @@ class Uncertainty:
             value = getattr(self, item.name)
             if isinstance(value, float) and not 0.0 <= value < math.inf:
                 raise ValueError(f"{item.name} must be >= 0 and finite, not {value}")
+        if not (self.speed_frac > 0.0 and self.drain_frac > 0.0):
+            shares = f"{self.speed_frac} and {self.drain_frac}"
+            raise ValueError(f"speed_frac and drain_frac must be > 0, not {shares}")
         for times_s in (self.lost_at_s, self.withdrawn_at_s):
             if not all(0.0 <= time_s < math.inf for time_s in times_s.values()):
                 raise ValueError(f"what is listed happens at mission times >= 0, not {times_s}")
@@ -133,7 +141,8 @@ class Uncertainty:
             withdrawn_at_s=self._withdrawals(drawn, span_s, seed),
             partitions=self._partitions(mission, span_s, seed),
             speed_frac={
-                uav.id: lognormal(
+                uav.id: self.speed_frac
+                * lognormal(
                     float(stream(seed, "speed", uav.id).standard_normal()), self.speed_sd_frac
                 )
                 for uav in mission.uavs

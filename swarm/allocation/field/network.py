@@ -138,8 +138,8 @@ class FieldNetwork:
         model, network = self._kind_of(uav)
         place_m, low_m, high_m = self._placed(uav, place_enu_m, flown_m)
         times_s: FloatArray = network.legs_from(place_m, low_m, high_m).times_s(model)[0]
-        times_s *= self.time_frac[uav]
-        return times_s
+        flown_s: FloatArray = times_s * self.time_frac[uav]
+        return flown_s
 
     def corners_m(self, uav: int, begin: int, end: int) -> FloatArray | None:
         """(k, 3) places [m; ENU] of the leg between two nodes, both included; None: no way."""
