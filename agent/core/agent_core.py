@@ -150,7 +150,7 @@ class AgentCore(AgentPart):
             event: what happened.
             now_s: now, on this process's own clock [s]; never decreases.
         """
-        self._tasking.keep_time(now_s)
+        self._mission_view.now_s = now_s
         if isinstance(event, Telemetry) and self._changes_nothing_else(now_s):
             self._mission_view.move(event)
             if not self._tasking.measure(now_s):

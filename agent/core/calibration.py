@@ -11,6 +11,10 @@ little, an odd one nothing, and after four the estimate is what was measured. Wh
 the own register moves in steps of `STEP_FRAC` or more, so that neither decisions nor problems
 change with each leg. A later life begins with what the register says.
 
+Only the own battery is watched with more caution: where the votes without those for what is known
+say worse than what is told, its sortie ends by them (`FlightMeter.cautious_drain_frac`), so that a
+UAV that finds itself slow on its first leg turns home in time.
+
 Leaves out: what follows (swarm.protocol.calibration, and agent.core.field_tasking for the battery).
 """
 
@@ -22,6 +26,8 @@ from statistics import median
 from typing import Final
 
 from agent.core.context import AgentContext, AgentPart
+from agent.core.energy import SortieClock
+from agent.core.states import AgentState
 from swarm.protocol.calibration import (
     AS_BRIEFED,
     DRAIN_FRAC_RANGE,
@@ -59,6 +65,12 @@ class RunningMedian:
         """The median of those that count."""
         return median(self._votes)
 
+    @property
+    def measured(self) -> float | None:
+        """The same without what was known beforehand; None before the first vote."""
+        votes = list(self._votes)[-self.count :] if self.count else []
+        return median(votes) if votes else None
+
 
 def told_anew(told: float, estimate: float, within: tuple[float, float]) -> float:
     """What to tell of an estimate: what was told before, unless that is a step away."""
@@ -68,7 +80,6 @@ def told_anew(told: float, estimate: float, within: tuple[float, float]) -> floa
 
 @dataclass(frozen=True, slots=True)
 class _Departure:
-    leg: int
     predicted_s: float
     """By the brief."""
     at_s: float
@@ -79,16 +90,31 @@ class FlightMeter(AgentPart):
 
     def __init__(self, context: AgentContext) -> None:
         super().__init__(context)
-        self.now_s = 0.0
-        """Of the step that is under way, on the own clock."""
+        self.sortie = SortieClock()
+        """How long the battery lasts."""
         self._known: tuple[RunningMedian, RunningMedian] | None = None
         """Of times and of drain; None before the first measurement of this life."""
         self._legs_before = 0
+        self._leg = 0
         self._departure: _Departure | None = None
+        """Of that leg, if it counts."""
         self._at_rest = False
         """Whether the vehicle hovers where its last leg has ended."""
         self._span: tuple[float, float] | None = None
         """When the charge was what, at the beginning of what is being measured."""
+
+    @property
+    def cautious_drain_frac(self) -> float:
+        """By how much sooner than by the brief the battery may be used up, as far as is known.
+
+        Legs that take longer than is told use it up likewise.
+        """
+        told = self.rates
+        if self._known is None or not self._counts:
+            return told.drain_frac
+        times, drains = self._known
+        longer = _worse(told.time_frac, times.measured, TIME_FRAC_RANGE) / told.time_frac
+        return longer * _worse(told.drain_frac, drains.measured, DRAIN_FRAC_RANGE)
 
     @property
     def rates(self) -> FlightRates:
@@ -97,33 +123,53 @@ class FlightMeter(AgentPart):
 
     # -- legs --------------------------------------------------------------------------
 
-    def hover(self) -> None:
-        """The vehicle is under command, at rest in the air."""
-        self._departure, self._at_rest, self._span = None, True, None
+    def begin(self, now_s: float) -> None:
+        """The vehicle is under command: at rest in the air, unless it still flies to a task."""
+        self.land()
+        self._at_rest = self._machine.state is not AgentState.RESUMING
+        self.sortie.heed(self.rates.drain_frac, self._mission_view.mission_s(now_s))
 
     def land(self) -> None:
         """It is on the ground, or about to land."""
         self._departure, self._at_rest, self._span = None, False, None
 
+    def take_off(self, now_s: float) -> None:
+        """It leaves the ground, and flies as it was decided there.
+
+        More caution needs more that is measured: else it could land again and again for it.
+        """
+        self.sortie.heed(self.rates.drain_frac, self._mission_view.mission_s(now_s))
+
     def depart(self, leg: int, predicted_s: float | None = None) -> None:
         """It sets off now, and should take so long by the brief; None: nobody can tell."""
-        at_rest, self._at_rest, self._departure = self._at_rest, False, None
+        at_rest, self._at_rest, self._departure, self._leg = self._at_rest, False, None, leg
         if at_rest and predicted_s is not None and predicted_s >= _SHORTEST_S:
-            self._departure = _Departure(leg, predicted_s, self.now_s)
+            self._departure = _Departure(predicted_s, self._mission_view.now_s)
 
-    def arrive(self, leg: int) -> bool:
-        """It is where that leg ends, the last one; whether that is news of how it flies."""
-        departure, self._departure, self._at_rest = self._departure, None, True
-        if departure is None or departure.leg != leg or not self._counts:
+    def arrive(self, leg: int, now_s: float) -> bool:
+        """It is where that leg ends; whether the battery is to be looked at anew."""
+        if leg != self._leg:
             return False
-        self._medians[0].add((self.now_s - departure.at_s) / departure.predicted_s)
-        return self._tell()
+        departure, self._departure, self._at_rest = self._departure, None, True
+        if departure is None or not self._counts:
+            return False
+        return self._vote(0, (now_s - departure.at_s) / departure.predicted_s, now_s)
 
     # -- battery -----------------------------------------------------------------------
 
-    def measure(self, endurance_s: float | None, battery_frac: float | None, now_s: float) -> bool:
-        """In flight it tells its charge; whether that is news of how it flies."""
-        if endurance_s is None or battery_frac is None or not self._counts:
+    def measure(self, now_s: float) -> bool:
+        """In flight it has told its charge; whether the battery is to be looked at anew."""
+        me, telemetry = self._mission_view.me, self._mission_view.telemetry
+        if me is None or telemetry is None or not self._mission_view.running:
+            return False
+        frac, mission_s = telemetry.battery_frac, self._mission_view.mission_s(now_s)
+        votes = self._counts and self._measure_drain(me.endurance_s, frac, now_s)
+        return self.sortie.measure(me, frac, mission_s) or votes
+
+    def _measure_drain(
+        self, endurance_s: float | None, battery_frac: float | None, now_s: float
+    ) -> bool:
+        if endurance_s is None or battery_frac is None:
             return False
         if self._span is None or battery_frac > self._span[1] + _RISE_FRAC:
             self._span = now_s, battery_frac
@@ -133,8 +179,7 @@ class FlightMeter(AgentPart):
         if used_frac < _SPAN_FRAC or flown_s <= 0.0:
             return False
         self._span = now_s, battery_frac
-        self._medians[1].add(used_frac * endurance_s / flown_s)
-        return self._tell()
+        return self._vote(1, used_frac * endurance_s / flown_s, now_s)
 
     # -- what comes of it --------------------------------------------------------------
 
@@ -156,7 +201,15 @@ class FlightMeter(AgentPart):
             self._legs_before = 0 if before is None else before.legs
         return self._known
 
-    def _tell(self) -> bool:
+    def _vote(self, which: int, vote: float, now_s: float) -> bool:
+        before = self.rates, self.cautious_drain_frac
+        self._medians[which].add(vote)
+        self._tell()
+        now = self.rates, self.cautious_drain_frac
+        self.sortie.heed(now[1], self._mission_view.mission_s(now_s))
+        return before != now
+
+    def _tell(self) -> None:
         """State the register anew, if the estimates have moved by a step."""
         told, (times, drains) = self._told, self._medians
         now = FlightRates(
@@ -164,8 +217,14 @@ class FlightMeter(AgentPart):
             told_anew(told.drain_frac, drains.value, DRAIN_FRAC_RANGE),
         )
         if now == told:
-            return False
+            return
         legs = self._legs_before + times.count
         self._say(Calibration(now.time_frac, now.drain_frac, legs))
         self._log("calibrated", time_frac=now.time_frac, drain_frac=now.drain_frac, legs=legs)
-        return True
+
+
+def _worse(told: float, measured: float | None, within: tuple[float, float]) -> float:
+    """What is told, or measured if that is more by a step."""
+    if measured is None or clamped(measured, within) < told * (1.0 + STEP_FRAC):
+        return told
+    return clamped(measured, within)

@@ -13,7 +13,7 @@ from dataclasses import replace
 from agent.core.base_visits import BaseVisits
 from agent.core.context import AgentContext
 from agent.core.decision import DecisionTurn, RefusedTasks
-from agent.core.energy import TOLERANCE_S, SortieClock
+from agent.core.energy import TOLERANCE_S
 from agent.core.field_decision import (
     FieldRule,
     FieldTurnDecision,
@@ -45,7 +45,7 @@ class FieldTasking(Tasking):
 
     def __init__(self, context: AgentContext, make_rule: RuleMaker = rule_of) -> None:
         super().__init__(context, make_rule)
-        self._sortie = SortieClock()
+        self._sortie = self._flights.meter.sortie
         self._visits = BaseVisits(context, self._flights, self._sortie, self._visit_over)
         self._limits = TimeLimits(context, self._flights, self._sortie)
         self._refused_bases = RefusedTasks(context.timing.reconsider_s)
@@ -60,11 +60,7 @@ class FieldTasking(Tasking):
 
     def begin(self, now_s: float) -> None:
         """The vehicle takes targets: as in a plain mission, or on to an earlier life's base."""
-        if self._machine.state is AgentState.RESUMING:  # it may fly still
-            self._flights.meter.land()
-        else:
-            self._flights.meter.hover()
-        self._sortie.heed(self._flights.meter.rates.drain_frac, self._mission_view.mission_s(now_s))
+        self._flights.meter.begin(now_s)
         me, claim = self._mission_view.me, self._replica.claims.get(self._uav)
         self._visits.leave_ground()
         if me is not None:
@@ -111,8 +107,7 @@ class FieldTasking(Tasking):
 
     def arrive(self, leg: int, now_s: float) -> None:
         """The vehicle is where that leg ends."""
-        if leg == self._flights.leg and self._flights.meter.arrive(leg):
-            self._heed_rates(now_s)
+        self._drained |= self._flights.meter.arrive(leg, now_s)
         problem, state = self._flights.problem, self._machine.state
         if problem is None:
             super().arrive(leg, now_s)
@@ -161,28 +156,10 @@ class FieldTasking(Tasking):
 
     def measure(self, now_s: float) -> bool:
         """The vehicle has told its charge: whether anything may follow from that."""
-        me, telemetry = self._mission_view.me, self._mission_view.telemetry
-        if me is None or telemetry is None or self._flights.problem is None:
+        if self._flights.problem is None or self._machine.state in AT_BASE:
             return False
-        if self._machine.state in AT_BASE:
-            return False
-        mission_s = self._mission_view.mission_s(now_s)
-        if self._mission_view.running:
-            meter = self._flights.meter
-            if meter.measure(me.endurance_s, telemetry.battery_frac, now_s):
-                self._heed_rates(now_s)
-            self._drained |= self._sortie.measure(me, telemetry.battery_frac, mission_s)
+        self._drained |= self._flights.meter.measure(now_s)
         return self._drained
-
-    def keep_time(self, now_s: float) -> None:
-        """A step begins."""
-        self._flights.meter.now_s = now_s
-
-    def _heed_rates(self, now_s: float) -> None:
-        """It flies otherwise than was known: what is under way may not end in time any more."""
-        drain_frac = self._flights.meter.rates.drain_frac
-        self._sortie.heed(drain_frac, self._mission_view.mission_s(now_s))
-        self._drained = True
 
     def advance_in_field(self, now_s: float) -> None:
         """What follows from constraints and the time, in a running mission, before `advance`."""
@@ -364,6 +341,7 @@ class FieldTasking(Tasking):
         me = self._mission_view.me
         self._departed_from = self._visits.leave_ground()
         if self._departed_from is not None and me is not None:
+            self._flights.meter.take_off(now_s)
             self._sortie.depart(me, self._mission_view.mission_s(now_s))
 
     def _depart_if_due(self, now_s: float) -> None:

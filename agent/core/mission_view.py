@@ -46,6 +46,8 @@ class MissionView:
         self.board = TaskBoard(replica, mission)
         self.telemetry: Telemetry | None = None
         """The newest of the own vehicle."""
+        self.now_s = 0.0
+        """Of the step that is under way, on the own clock."""
         self._place_enu_m: Point | None = None
         self._stands_enu_m: Point | None = None
         """Where it stands on the ground, between two flights."""
