@@ -15,6 +15,7 @@ from collections.abc import Iterable, Mapping
 
 from agent.core.announcer import Announcer
 from agent.core.context import AgentContext, AgentPart
+from agent.core.field_decision import FieldRuleMaker, field_rule_of
 from agent.core.field_tasking import FieldTasking
 from agent.core.interface import (
     Action,
@@ -84,6 +85,7 @@ class AgentCore(AgentPart):
             to fly on.
         make_rule: what it decides by in an epoch of that rule and those routes. Every UAV of a
             fleet needs the same.
+        make_field_rule: the same where the field's constraints count.
     """
 
     def __init__(
@@ -99,6 +101,7 @@ class AgentCore(AgentPart):
         without_bus_s: float | None = None,
         make_rule: RuleMaker = rule_of,
         path_clearance_m: float = 0.0,
+        make_field_rule: FieldRuleMaker = field_rule_of,
     ) -> None:
         self.uav = uav
         self.replica = Replica()
@@ -117,6 +120,7 @@ class AgentCore(AgentPart):
             announcer=Announcer(RegisterWriter(mission, uav, incarnation), self.replica, timing),
             machine=AgentStateMachine(self._note_impossible),
             path_clearance_m=path_clearance_m,
+            make_field_rule=make_field_rule,
         )
         super().__init__(context)
         self._tasking = FieldTasking(context, make_rule)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 from agent.core.announcer import Announcer
 from agent.core.interface import Action, OrderVehicle, VehicleOrder
@@ -12,6 +13,9 @@ from swarm.protocol.events import LogLine
 from swarm.protocol.messages import Body
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
+
+if TYPE_CHECKING:
+    from agent.core.field_decision import FieldRuleMaker
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +31,8 @@ class AgentContext:
     peers: Peers
     announcer: Announcer
     machine: AgentStateMachine
+    make_field_rule: FieldRuleMaker
+    """What it decides by in an epoch where the field's constraints count."""
     path_clearance_m: float = 0.0
     """How much farther than their margin ways lead past zones [m]."""
     actions: list[Action] = field(default_factory=list)
@@ -44,6 +50,7 @@ class AgentPart:
         self._peers = context.peers
         self._announcer = context.announcer
         self._machine = context.machine
+        self._make_field_rule = context.make_field_rule
         self._actions = context.actions
 
     def _say(self, body: Body) -> None:

@@ -8,14 +8,14 @@ Leaves out: what is done with the decision.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from agent.core.decision import DIVERSION_MARGIN_FRAC, DecisionTurn
 from swarm.allocation.field import FieldProblem, FieldState
-from swarm.allocation.field.rules import FIELD_RULES, GUIDED, item_lists
+from swarm.allocation.field.rules import FIELD_INDEX_RULES, FIELD_RULES, GUIDED, item_lists
 from swarm.kernels.field import FieldRuleCode, fly_lists, run_rule
 from swarm.kernels.field_search import SearchedLists, optimise_lists
 from swarm.model import BaseId, TaskId
@@ -25,6 +25,7 @@ from swarm.protocol.uav_messages import Claim, ClaimPhase
 
 _SEED = 0
 """Of the search of every decision: the same state gives the same lists everywhere."""
+_RULES = {**FIELD_RULES, **FIELD_INDEX_RULES}
 _ITERATIONS_PER_TASK, _FEWEST_ITERATIONS, _MOST_ITERATIONS = 20, 50, 250
 
 
@@ -56,6 +57,10 @@ class FieldTurnDecision:
     """Of the best task it does not take; None when there is no other, or the rule values lists."""
 
 
+ListMaker = Callable[[FieldProblem, FieldState, int], SearchedLists]
+"""Lists of the whole team from a state on, for the decision of one UAV."""
+
+
 @dataclass(frozen=True, slots=True)
 class FieldRule:
     """The rule of an epoch, for missions with the field's constraints; see `field_rule_of`."""
@@ -63,6 +68,12 @@ class FieldRule:
     name: str
     routes: Mapping[str, Sequence[str]]
     """Task ids by UAV in order of execution; heeded by ``guided`` alone."""
+    make_lists: ListMaker | None = None
+    """Whose lists are followed instead of any rule; a UAV with none stays where it is."""
+
+
+FieldRuleMaker = Callable[[str, Mapping[str, Sequence[str]]], FieldRule | None]
+"""The decision rule of an epoch by the name of its rule and its routes; see `field_rule_of`."""
 
 
 def field_rule_of(name: str, routes: Mapping[str, Sequence[str]]) -> FieldRule | None:
@@ -85,9 +96,11 @@ def decide_in_field(
     if not state.open.any():
         return None
     mine = problem.uav_ids.index(turn.uav)
+    if rule.make_lists is not None:
+        return _first_of_lists(problem, state, mine, rule.make_lists(problem, state, mine))
     if rule.name == GUIDED:
         return _first_of_lists(problem, state, mine, _searched(problem, state, rule))
-    return _by_rule(problem, state, mine, FIELD_RULES[rule.name])
+    return _by_rule(problem, state, mine, _RULES[rule.name])
 
 
 def divert_in_field(

@@ -19,7 +19,6 @@ from agent.core.field_decision import (
     FieldTurnDecision,
     decide_in_field,
     divert_in_field,
-    field_rule_of,
 )
 from agent.core.flights import HomeFlight
 from agent.core.states import (
@@ -223,7 +222,7 @@ class FieldTasking(Tasking):
 
     def _field_rule(self, epoch: PlanEpoch) -> FieldRule | None:
         """The rule in force; None, and told once, if it is not known."""
-        rule = field_rule_of(epoch.rule, epoch.routes)
+        rule = self._make_field_rule(epoch.rule, epoch.routes)
         if rule is None and self._rule_basis != epoch.rule:
             self._rule_basis = epoch.rule
             self._announcer.explain(f"cannot decide by rule {epoch.rule}")

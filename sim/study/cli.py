@@ -85,7 +85,7 @@ def study(
             errors.print(line, highlight=False, soft_wrap=True)
             return _INTERRUPTED
     summary = _summary(found, rows, here=output.scheduler is None)
-    files = [] if output.out is None else _write(output.out, summary, rows, output)
+    files = [] if output.out is None else _write(output.out, found, summary, rows, output)
     if marked is not None:
         marked.replace(summary.markdown())
     _tell(found, summary, files, json=json)
@@ -106,19 +106,24 @@ def _summary(found: Study, rows: list[TrialRow], *, here: bool) -> StudySummary:
     from sim.bench.machine import this_machine
     from sim.study.design import RandomMissions
     from sim.study.policies.roster import ROSTER
+    from sim.study.style import shape_words
     from sim.study.summary import StudyDescription, summarise
     from sim.study.trial import BOUND
 
     match found.missions:
-        case RandomMissions(uavs, tasks):
+        case RandomMissions(uavs, tasks, shape):
             missions = f"random missions of {uavs} UAVs and {tasks} tasks"
+            if shape is not None:
+                missions += f" in the field ({shape_words(shape)})"
         case same:
             missions = f"mission {same.mission.name}"
     if found.uncertainty.outcomes:
         again = found.mission(0).reattempt_failed
         missions += f", where failed tasks {'open again' if again else 'stay failed'}"
     machine = this_machine()
-    what = {name: ROSTER.policy(name).what for name in found.policies}
+    what = {
+        name: ROSTER.policy(name, in_field=found.in_field).what for name in found.policies
+    }
     if found.bound:
         what[BOUND] = ROSTER.make_bound().what
     about = StudyDescription(
@@ -133,15 +138,16 @@ def _summary(found: Study, rows: list[TrialRow], *, here: bool) -> StudySummary:
 
 
 def _write(
-    folder: Path, summary: StudySummary, rows: list[TrialRow], output: StudyOutput
+    folder: Path, found: Study, summary: StudySummary, rows: list[TrialRow], output: StudyOutput
 ) -> list[Path]:
     """Everything but the trials themselves; the files that ``folder`` has then got."""
     from sim.study.store import ROWS_FILE, STUDY_FILE, write_parquet
+    from sim.study.trial import columns_of
 
     files = [folder / STUDY_FILE, folder / ROWS_FILE]
     try:
         if output.file_format == "parquet":
-            files.append(write_parquet(folder, rows))
+            files.append(write_parquet(folder, rows, columns_of(found)))
         files.append(folder / _SUMMARY_FILE)
         files[-1].write_text(summary.markdown(every_setting=True), encoding="utf-8")
         if output.plots:

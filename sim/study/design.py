@@ -14,10 +14,12 @@ import numpy as np
 
 from sim.options import with_reattempts
 from sim.study.baselines.index_rules import makespan_s, value_per_time
+from sim.study.field_generator import FieldShape, field_span_s, random_field_mission
 from sim.study.generator import mission_of, random_mission
 from sim.world.uncertainty import Uncertainty
 from swarm.allocation.problem import Problem
 from swarm.model import Mission
+from swarm.protocol.board import is_of_field
 from swarm.scenario.findings import number_of, shown
 
 NUMBERS = tuple(item.name for item in fields(Uncertainty) if item.type == "float")
@@ -25,6 +27,10 @@ NUMBERS = tuple(item.name for item in fields(Uncertainty) if item.type == "float
 SWITCHES = tuple(item.name for item in fields(Uncertainty) if item.type == "bool")
 LISTED = tuple(item.name for item in fields(Uncertainty) if item.name not in (*NUMBERS, *SWITCHES))
 """What of it happens at listed moments."""
+FIELD_NUMBERS = tuple(item.name for item in fields(FieldShape))
+"""What of the shape of random missions in the field can be varied."""
+FIELD_SHARES = ("windows_frac", "due_frac", "lines_frac")
+"""Those of them that are within 0..1."""
 PROBABILITIES = ("loss", "popup", "message_loss")
 """Those of `NUMBERS` that are within 0..1."""
 
@@ -47,19 +53,24 @@ class RandomMissions:
 
     uavs: int
     tasks: int
+    shape: FieldShape | None = None
+    """What constrains them; None for the paper's."""
 
     def of_trial(self, seed: int, trial: int) -> Mission:
         """The mission of that trial."""
+        if self.shape is not None:
+            name = f"field-{self.uavs}x{self.tasks}-{seed + trial}"
+            return random_field_mission(self.uavs, self.tasks, seed + trial, self.shape, name)
         name = f"random-{self.uavs}x{self.tasks}-{seed + trial}"
         return mission_of(random_mission(self.uavs, self.tasks, seed + trial), name)
 
 
 @dataclass(frozen=True, slots=True)
 class Factor:
-    """One number of the uncertainty that is varied while the others stay."""
+    """One number of the uncertainty, or of missions, that is varied while the others stay."""
 
     what: str
-    """One of `NUMBERS`."""
+    """One of `NUMBERS` or `FIELD_NUMBERS`."""
     values: tuple[float, ...]
     trials: int | None = None
     """None for as many as the study's own setting has."""
@@ -67,13 +78,14 @@ class Factor:
 
 @dataclass(frozen=True, slots=True)
 class DesignPoint:
-    """One setting of the uncertainty."""
+    """One setting of the uncertainty and the missions."""
 
     index: int
     vary: str
-    """One of `NUMBERS`; empty for the study's own setting."""
+    """One of `NUMBERS` or `FIELD_NUMBERS`; empty for the study's own setting."""
     at: float | None
     uncertainty: Uncertainty
+    missions: SameMission | RandomMissions
     trials: int
     world: int
     """Least index of the points with the same setting; they share what is flown there."""
@@ -108,15 +120,30 @@ class Study:
         plain = self.uncertainty == Uncertainty() and not self.varied
         return plain and isinstance(self.missions, SameMission)
 
+    @property
+    def in_field(self) -> bool:
+        """Whether it is of missions with the field's constraints."""
+        match self.missions:
+            case RandomMissions(shape=shape):
+                return shape is not None
+            case SameMission(mission):
+                return is_of_field(mission)
+
     def points(self) -> tuple[DesignPoint, ...]:
         """All settings: the study's own, then every value of every number that is varied."""
         points: list[DesignPoint] = []
         for vary, at, trials in self._settings():
             change: dict[str, Any] = {} if at is None else {vary: at}
-            setting = replace(self.uncertainty, **change)
+            missions, setting = self.missions, self.uncertainty
+            if vary in FIELD_NUMBERS and isinstance(missions, RandomMissions):
+                shape = replace(missions.shape or FieldShape(), **change)
+                missions = replace(missions, shape=shape)
+            else:
+                setting = replace(setting, **change)
             index = len(points)
-            world = next((p.index for p in points if p.uncertainty == setting), index)
-            points.append(DesignPoint(index, vary, at, setting, trials, world))
+            alike = (p.index for p in points if (p.uncertainty, p.missions) == (setting, missions))
+            world = next(alike, index)
+            points.append(DesignPoint(index, vary, at, setting, missions, trials, world))
         return tuple(points)
 
     def _settings(self) -> Iterator[tuple[str, float | None, int]]:
@@ -126,9 +153,9 @@ class Study:
             for value in varied.values:
                 yield varied.what, value, trials
 
-    def mission(self, trial: int) -> Mission:
-        """What is flown in that trial, at every point."""
-        mission = self.missions.of_trial(self.seed, trial)
+    def mission(self, trial: int, missions: SameMission | RandomMissions | None = None) -> Mission:
+        """What is flown in that trial of the study's own missions, or of a point's."""
+        mission = (missions or self.missions).of_trial(self.seed, trial)
         return with_reattempts(mission, reattempt=self.reattempt)
 
 
@@ -143,6 +170,8 @@ def span_s(mission: Mission) -> float:
 
     That asks no policy that is studied, and is the same for all of them.
     """
+    if is_of_field(mission):
+        return field_span_s(mission)
     problem = Problem.from_mission(mission)
     return makespan_s(problem, value_per_time(problem))
 
@@ -152,8 +181,9 @@ def wrong_number(name: str, value: object) -> str | None:
     number = number_of(value)
     if number is None:
         return f"{shown(value)} is not a finite number"
-    if number < 0.0 or (name in PROBABILITIES and number > 1.0):
-        return f"{shown(value)} is not {'within 0..1' if name in PROBABILITIES else '>= 0'}"
+    share = name in (*PROBABILITIES, *FIELD_SHARES)
+    if number < 0.0 or (share and number > 1.0):
+        return f"{shown(value)} is not {'within 0..1' if share else '>= 0'}"
     return None
 
 
@@ -175,7 +205,9 @@ def unlisted(
 
 
 def right_number(name: str) -> str:
-    """What the number ``name`` of the uncertainty may be."""
+    """What the number ``name`` may be."""
+    if name in FIELD_SHARES:
+        return "a share within 0..1"
     return "a probability within 0..1" if name in PROBABILITIES else "a number >= 0"
 
 

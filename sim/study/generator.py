@@ -22,6 +22,11 @@ _TASKS_ON_IT = 500
 _HORIZON_SHARE = 1.2
 
 
+def area_side_m(n_task: int) -> float:
+    """Side of the square over which so many tasks are spread [m]."""
+    return _SIDE_M * math.sqrt(n_task / _TASKS_ON_IT)
+
+
 def random_mission(
     n_uav: int,
     n_task: int,
@@ -36,7 +41,7 @@ def random_mission(
     of a good plan when None.
     """
     rng = np.random.default_rng(seed)
-    side_m = _SIDE_M * math.sqrt(n_task / _TASKS_ON_IT)
+    side_m = area_side_m(n_task)
     if horizon_s is None:
         # a tour of n of M uniform places is some 0.75·side·n/√M long
         leg_s = 0.75 * side_m / math.sqrt(n_task) / 11.5 + 10.0

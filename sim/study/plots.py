@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING, Literal
 from sim.study.statistics import Estimate
 from sim.study.style import (
     IDEAL,
-    QUANTITIES,
     add_legend,
     add_title,
     error_lengths,
@@ -23,6 +22,7 @@ from sim.study.style import (
     name_rows,
     plain_axes,
     policy_label,
+    quantity_of,
     rows_figure,
     save_figures,
     style_of,
@@ -111,7 +111,7 @@ def value_figure(summary: StudySummary, vary: str) -> Figure:
     right.axhline(1.0, color="#555555", linewidth=0.8, zorder=1)
     beyond = _keep_close(right, summary, settings)
     add_legend(figure, left)
-    name = QUANTITIES[vary].name
+    name = quantity_of(vary).name
     note = "; ".join(filter(None, [_ideal_note(summary, "dashed:"), *beyond]))
     add_title(figure, f"Value against {name}, {trials_text(settings)}", note)
     return figure
@@ -131,7 +131,7 @@ def churn_figure(summary: StudySummary, vary: str) -> Figure:
         _from_zero(axes, "y")
         axes.set_ylabel(label)
     add_legend(figure, panels[0])
-    name = QUANTITIES[vary].name
+    name = quantity_of(vary).name
     add_title(
         figure,
         f"Duplicates and churn against {name}, {trials_text(settings)}",
@@ -219,7 +219,7 @@ def _against(axes: Axes, vary: str, settings: Sequence[PointSummary]) -> None:
     axes.set_xticks(xs, [f"{x:g}" for x in xs])
     pad = 0.06 * (max(xs) - min(xs)) or 1.0
     axes.set_xlim(min(xs) - pad, max(xs) + pad)
-    axes.set_xlabel(QUANTITIES[vary].label)
+    axes.set_xlabel(quantity_of(vary).label)
 
 
 def _from_zero(axes: Axes, along: Literal["x", "y"]) -> None:
@@ -305,7 +305,7 @@ def _shown(settings: Sequence[PointSummary], name: str) -> list[tuple[PointSumma
 
 
 def _x(setting: PointSummary) -> float:
-    return QUANTITIES[setting.vary].shown(setting.at or 0.0)
+    return quantity_of(setting.vary).shown(setting.at or 0.0)
 
 
 def _style(summary: StudySummary, name: str) -> str:

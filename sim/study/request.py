@@ -9,6 +9,7 @@ from pathlib import Path
 
 from sim.options import ChanceOptions
 from sim.study.design import (
+    FIELD_NUMBERS,
     NUMBERS,
     Factor,
     RandomMissions,
@@ -21,7 +22,7 @@ from sim.study.options import StudyRequest
 from sim.study.policies.roster import PolicyRoster
 from sim.study.study_file import DEFAULT_TRIALS, MOST_TASKS, MOST_UAVS, load_study
 from swarm.runtime.errors import Fault, InputError
-from swarm.scenario import load_scenario, require_plain, shipped_scenarios
+from swarm.scenario import load_scenario, shipped_scenarios
 from swarm.scenario.files import read_bytes
 from swarm.scenario.findings import close_match, printable
 from swarm.scenario.read import parse_toml
@@ -59,6 +60,7 @@ def requested_study(asked: StudyRequest, chance: ChanceOptions, roster: PolicyRo
         study = replace(study, trials=asked.trials, varied=everywhere)
     if asked.vary:
         study = replace(study, varied=tuple(_varied(asked.vary)))
+    _check_field(study, asked, roster)
     return replace(
         study,
         seed=study.seed if asked.seed is None else asked.seed,
@@ -84,7 +86,6 @@ def _base(asked: StudyRequest, roster: PolicyRoster) -> Study:
             )
             raise InputError(fault)
         mission = load_scenario(path)
-        require_plain(mission, "swarm study")
         return _plain(mission.name, SameMission(mission), roster)
     study = load_study(path, roster)
     if missions is None:
@@ -93,12 +94,43 @@ def _base(asked: StudyRequest, roster: PolicyRoster) -> Study:
         problem = f"has no {name}, of which the study lists {key}"
         fault = Fault("--random", str(asked.random), problem, "ask for larger missions")
         raise InputError(fault)
+    if isinstance(study.missions, RandomMissions):
+        missions = replace(missions, shape=study.missions.shape)
     return replace(study, missions=missions)
 
 
+def _check_field(study: Study, asked: StudyRequest, roster: PolicyRoster) -> None:
+    """Refuse what does not go with missions in the field, or without them.
+
+    Raises:
+        InputError: something of it is asked for.
+    """
+    faults: list[Fault] = []
+    shaped = isinstance(study.missions, RandomMissions) and study.missions.shape is not None
+    for varied in study.varied:
+        if varied.what in FIELD_NUMBERS and not shaped:
+            problem = "is of random missions in the field alone"
+            remedy = "give a study of them, such as field"
+            faults.append(Fault("--vary", varied.what, problem, remedy))
+    if study.in_field:
+        for name in study.policies:
+            if not roster.in_field(name):
+                remedy = f"give some of {', '.join(roster.names(in_field=True))}"
+                faults.append(
+                    Fault("--policies", name, "does not heed the field's constraints", remedy)
+                )
+        if asked.bound:
+            problem = "no bound is known of missions in the field"
+            faults.append(Fault("--bound", "", problem, "leave it out"))
+    if faults:
+        raise InputError(*faults)
+
+
 def _plain(name: str, missions: SameMission | RandomMissions, roster: PolicyRoster) -> Study:
-    names = tuple(roster.policies)
-    return Study(name, missions, names, DEFAULT_TRIALS, reference=_usual_reference(names))
+    in_field = Study(name, missions, (), 1).in_field
+    names = roster.names(in_field=in_field)
+    study = Study(name, missions, names, DEFAULT_TRIALS, reference=_usual_reference(names))
+    return replace(study, bound=not in_field)
 
 
 def _usual_reference(names: Sequence[str]) -> str:
@@ -163,7 +195,7 @@ def _varied(options: Sequence[str]) -> list[Factor]:
     faults: list[Fault] = []
     for option in options:
         what, equals, text = option.partition("=")
-        if what not in NUMBERS or not equals:
+        if what not in (*NUMBERS, *FIELD_NUMBERS) or not equals:
             close = close_match(what, NUMBERS)
             right = f"did you mean {close!r}?" if close else f"vary one of {', '.join(NUMBERS)}"
             remedy = right if equals else "give NAME=VALUE,VALUE, such as loss=0,0.1,0.3"

@@ -20,29 +20,29 @@ from typing import Any
 from sim.study.design import SameMission, Study
 from sim.study.policies.roster import PolicyRoster
 from sim.study.study_file import format_study, load_study
-from sim.study.trial import COLUMNS, TrialJob, TrialRow, rows_due
+from sim.study.trial import COLUMNS, TrialJob, TrialRow, columns_of, rows_due
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario import format_scenario
 
 _PARQUET_FILE = "trials.parquet"
 
 
-def row_line(row: TrialRow) -> str:
+def row_line(row: TrialRow, columns: Sequence[str] = COLUMNS) -> str:
     """A row as a line of CSV: numbers with all their digits, nothing for None."""
     buffer = io.StringIO()
-    cells = ("" if value is None else value for value in (getattr(row, c) for c in COLUMNS))
+    cells = ("" if value is None else value for value in (getattr(row, c) for c in columns))
     csv.writer(buffer, lineterminator="\n").writerow(
         [repr(float(cell)) if isinstance(cell, float) else cell for cell in cells]
     )
     return buffer.getvalue()
 
 
-def table_text(rows: Iterable[TrialRow]) -> str:
+def table_text(rows: Iterable[TrialRow], columns: Sequence[str] = COLUMNS) -> str:
     """A whole file of rows."""
-    return ",".join(COLUMNS) + "\n" + "".join(row_line(row) for row in rows)
+    return ",".join(columns) + "\n" + "".join(row_line(row, columns) for row in rows)
 
 
-def read_rows(path: Path) -> list[TrialRow]:
+def read_rows(path: Path, columns: Sequence[str] = COLUMNS) -> list[TrialRow]:
     """The rows of a file; a last line that is not ended was being written, and is left out.
 
     Raises:
@@ -56,10 +56,10 @@ def read_rows(path: Path) -> list[TrialRow]:
     for number, cells in enumerate(csv.reader(lines), start=1):
         try:
             if number == 1:
-                if tuple(cells) != COLUMNS:
+                if cells != list(columns):
                     raise ValueError("has not the columns of a study")
             else:
-                rows.append(_row(cells))
+                rows.append(_row(cells, columns))
         except ValueError as error:
             problem = f"is no row of a study: {error}" if number > 1 else str(error)
             remedy = "name another folder, or remove this one"
@@ -67,7 +67,9 @@ def read_rows(path: Path) -> list[TrialRow]:
     return rows
 
 
-def write_parquet(folder: Path, rows: Sequence[TrialRow]) -> Path:
+def write_parquet(
+    folder: Path, rows: Sequence[TrialRow], columns: Sequence[str] = COLUMNS
+) -> Path:
     """Write all rows as Parquet, which needs the extra ``study``; gives the file.
 
     Raises:
@@ -77,11 +79,12 @@ def write_parquet(folder: Path, rows: Sequence[TrialRow]) -> Path:
     import pyarrow.parquet as pq
 
     kinds = {"s": pa.string(), "i": pa.int64(), "f": pa.float64()}
-    schema = pa.schema([(item.name, kinds[str(item.type)[0]]) for item in fields(TrialRow)])
-    columns = {name: [getattr(row, name) for row in rows] for name in COLUMNS}
+    types = {item.name: kinds[str(item.type)[0]] for item in fields(TrialRow)}
+    schema = pa.schema([(name, types[name]) for name in columns])
+    arrays = {name: [getattr(row, name) for row in rows] for name in columns}
     path = folder / _PARQUET_FILE
     draft = path.with_suffix(".next")
-    pq.write_table(pa.table(columns, schema=schema), draft)
+    pq.write_table(pa.table(arrays, schema=schema), draft)
     draft.replace(path)
     return path
 
@@ -96,9 +99,9 @@ def replace_text(path: Path, text: str) -> None:
     draft.replace(path)
 
 
-def _row(cells: Sequence[str]) -> TrialRow:
+def _row(cells: Sequence[str], columns: Sequence[str]) -> TrialRow:
     values: dict[str, Any] = {
-        name: _PARSERS[name](cell) for name, cell in zip(COLUMNS, cells, strict=True)
+        name: _PARSERS[name](cell) for name, cell in zip(columns, cells, strict=True)
     }
     return TrialRow(**values)
 
@@ -151,6 +154,7 @@ class FolderStore(RowStore):
     def __init__(self, folder: Path, study: Study, roster: PolicyRoster) -> None:
         super().__init__(study)
         self._folder = folder
+        self._columns = columns_of(study)
         self._rows_path = folder / ROWS_FILE
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -160,7 +164,7 @@ class FolderStore(RowStore):
         try:
             self._take(roster)
             self._rows = self._kept_rows()
-            replace_text(self._rows_path, table_text(self._rows))
+            replace_text(self._rows_path, table_text(self._rows, self._columns))
             self._file = self._rows_path.open("a", encoding="utf-8", newline="")
         except OSError as error:
             self._lock.close()
@@ -171,7 +175,7 @@ class FolderStore(RowStore):
 
     def add(self, rows: Sequence[TrialRow]) -> None:
         """Append the rows of one job; they are with the operating system when this returns."""
-        self._file.write("".join(row_line(row) for row in rows))
+        self._file.write("".join(row_line(row, self._columns) for row in rows))
         self._file.flush()
         super().add(rows)
 
@@ -179,7 +183,7 @@ class FolderStore(RowStore):
         """All rows, sorted by point, trial and policy, as the file has them then."""
         self._rows = super().finish()
         self._file.close()
-        replace_text(self._rows_path, table_text(self._rows))
+        replace_text(self._rows_path, table_text(self._rows, self._columns))
         self._file = self._rows_path.open("a", encoding="utf-8", newline="")
         return list(self._rows)
 
@@ -215,7 +219,7 @@ class FolderStore(RowStore):
         """The rows of all jobs that are complete; what is left of others is flown again."""
         if not self._rows_path.exists():
             return []
-        rows = {row.key: row for row in read_rows(self._rows_path)}
+        rows = {row.key: row for row in read_rows(self._rows_path, self._columns)}
         return [
             rows[key]
             for keys in rows_due(self._study).values()

@@ -9,6 +9,8 @@ from typing import Annotated, Any
 from pydantic import Field, create_model
 
 from sim.study.design import (
+    FIELD_NUMBERS,
+    FIELD_SHARES,
     LISTED,
     NUMBERS,
     PROBABILITIES,
@@ -21,11 +23,13 @@ from sim.study.design import (
     unlisted,
     wrong_values,
 )
+from sim.study.field_generator import FieldShape
 from sim.study.policies.roster import PolicyRoster
 from sim.world.uncertainty import Uncertainty
 from swarm.model.ids import ID_RULE
+from swarm.protocol.board import is_of_field
 from swarm.runtime.errors import InputError
-from swarm.scenario import load_scenario, require_plain, resolve_scenario
+from swarm.scenario import load_scenario, resolve_scenario
 from swarm.scenario.files import read_bytes
 from swarm.scenario.findings import Document, Finding, close_match, faults_of, printable, shown
 from swarm.scenario.read import parse_toml
@@ -39,8 +43,8 @@ from swarm.scenario.validation import (
 )
 from swarm.scenario.write import toml_float, toml_string
 
-SCHEMA = 1
-"""The version of the format that is read and written."""
+PLAIN_SCHEMA, SCHEMA = 1, 2
+"""The versions of the format: of studies of plain missions, and of those in the field."""
 DEFAULT_TRIALS = 50
 MOST_TRIALS = 1_000_000
 MOST_SEED = 2**63 - 1
@@ -51,14 +55,21 @@ _Trials = Annotated[int, Field(ge=1, le=MOST_TRIALS)]
 _Amount = Annotated[float, Field(ge=0.0)]
 
 
-class _RandomTable(StrictTable):
+class _SizeTable(StrictTable):
     uavs: Annotated[int, Field(ge=1, le=MOST_UAVS)]
     tasks: Annotated[int, Field(ge=1, le=MOST_TASKS)]
 
 
+_SHAPE: dict[str, Any] = {
+    name: (Probability if name in FIELD_SHARES else _Amount, getattr(FieldShape(), name))
+    for name in FIELD_NUMBERS
+}
+_RandomTable = create_model("_RandomTable", __base__=_SizeTable, **_SHAPE)
+
+
 class _MissionTable(StrictTable):
     scenario: Annotated[str, Field(min_length=1)] | None = None
-    random: _RandomTable | None = None
+    random: _RandomTable | None = None  # type: ignore[valid-type]  # made above
 
 
 class _VaryTable(StrictTable):
@@ -102,7 +113,7 @@ _SWITCH = "true or false"
 _MOMENTS = "a table of ids with a mission time >= 0 each [s]"
 _TRIALS = f"an integer within 1..{MOST_TRIALS}"
 _RIGHT: Mapping[tuple[str, ...], str] = {
-    ("schema",): f"schema = {SCHEMA}",
+    ("schema",): f"schema = {PLAIN_SCHEMA}, or {SCHEMA} for missions in the field",
     ("name",): f'an id of {ID_RULE}, such as name = "robustness"',
     ("trials",): _TRIALS,
     ("seed",): f"an integer within 0..{MOST_SEED}",
@@ -114,13 +125,14 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("mission", "random"): "random = { uavs = 10, tasks = 50 }",
     ("mission", "random", "uavs"): f"an integer within 1..{MOST_UAVS}",
     ("mission", "random", "tasks"): f"an integer within 1..{MOST_TASKS}",
+    **{("mission", "random", name): right_number(name) for name in FIELD_NUMBERS},
     ("uncertainty",): "a table [uncertainty]",
     **{("uncertainty", name): right_number(name) for name in NUMBERS},
     **{("uncertainty", name): _SWITCH for name in (*SWITCHES, "reattempt")},
     **dict.fromkeys((("uncertainty", name) for name in LISTED), _MOMENTS),
     **{("uncertainty", name, "*"): "a mission time >= 0 [s]" for name in LISTED},
     ("vary",): "a table [[vary]] for each number that is varied",
-    ("vary", "what"): f"one of {', '.join(NUMBERS)}",
+    ("vary", "what"): f"one of {', '.join(NUMBERS)}; in the field also {', '.join(FIELD_NUMBERS)}",
     ("vary", "values"): "at least one in an array, such as values = [0.0, 0.3]",
     ("vary", "trials"): _TRIALS,
 }
@@ -149,6 +161,7 @@ def parse_study(data: bytes, source: str, roster: PolicyRoster, folder: Path = P
         *_wrong_policies(document, roster),
         *_wrong_mission(document),
         *_wrong_factors(document),
+        *_wrong_in_field(document),
     ]
     missions = None
     if not any(finding.path[0] == "mission" for finding in findings):
@@ -157,6 +170,7 @@ def parse_study(data: bytes, source: str, roster: PolicyRoster, folder: Path = P
         except InputError as error:
             raise InputError(*faults_of(document, source, findings), *error.faults) from error
         findings += _wrong_ids(document, missions)
+        findings += _wrong_of_field(document, missions, roster)
     if study is None or missions is None or findings:
         raise InputError(*faults_of(document, source, findings))
     given = study.uncertainty.model_dump(exclude_unset=True)
@@ -164,11 +178,11 @@ def parse_study(data: bytes, source: str, roster: PolicyRoster, folder: Path = P
     return Study(
         name=study.name,
         missions=missions,
-        policies=tuple(study.policies or roster.policies),
+        policies=tuple(study.policies or roster.names(in_field=study.version == SCHEMA)),
         trials=study.trials,
         seed=study.seed,
         reference=study.reference,
-        bound=study.bound,
+        bound=study.bound and study.version == PLAIN_SCHEMA,
         uncertainty=Uncertainty(**given),
         reattempt=reattempt,
         varied=tuple(Factor(v.what, tuple(map(float, v.values)), v.trials) for v in study.vary),
@@ -182,10 +196,11 @@ def _missions(table: Any, folder: Path) -> SameMission | RandomMissions:
         InputError: the scenario cannot be found or is wrong.
     """
     if "random" in table:
-        return RandomMissions(**table["random"])
+        given = {name: float(n) for name, n in table["random"].items() if name in FIELD_NUMBERS}
+        shape = FieldShape(**given) if given else None
+        return RandomMissions(table["random"]["uavs"], table["random"]["tasks"], shape)
     beside = folder / table["scenario"]
     mission = load_scenario(beside if beside.is_file() else resolve_scenario(table["scenario"]))
-    require_plain(mission, "swarm study")
     return SameMission(mission)
 
 
@@ -229,7 +244,7 @@ def _wrong_factors(document: Document) -> Iterator[Finding]:
         if not isinstance(what, str):
             continue
         place = ("vary", index)
-        if what not in NUMBERS:
+        if what not in (*NUMBERS, *FIELD_NUMBERS):
             yield _not_one_of((*place, "what"), what, NUMBERS)
             continue
         if what in seen:
@@ -239,6 +254,49 @@ def _wrong_factors(document: Document) -> Iterator[Finding]:
         values = table.get("values")
         for at, problem, remedy in wrong_values(what, values if isinstance(values, list) else ()):
             yield Finding((*place, "values", at), problem, remedy)
+
+
+def _wrong_in_field(document: Document) -> Iterator[Finding]:
+    """Keys of schema 2 in a file of schema 1."""
+    mission, tables = document.get("mission"), document.get("vary")
+    given = mission.get("random") if isinstance(mission, Mapping) else None
+    random = given if isinstance(given, Mapping) else {}
+    varies = tables if isinstance(tables, list) else []
+    remedy = f"say schema = {SCHEMA}"
+    if document.get("schema") == PLAIN_SCHEMA:
+        for name in FIELD_NUMBERS:
+            if name in random:
+                yield Finding(("mission", "random", name), "needs another schema", remedy)
+        for index, table in enumerate(varies):
+            if isinstance(table, Mapping) and table.get("what") in FIELD_NUMBERS:
+                yield Finding(("vary", index, "what"), "needs another schema", remedy)
+    elif not any(name in random for name in FIELD_NUMBERS):
+        for index, table in enumerate(varies):
+            if isinstance(table, Mapping) and table.get("what") in FIELD_NUMBERS:
+                problem = f"is of random missions in the field, and {given!r} has none of it"
+                remedy = "give random such as { uavs = 10, tasks = 50, bases = 2 }"
+                yield Finding(("vary", index, "what"), problem, remedy)
+
+
+def _wrong_of_field(
+    document: Document, missions: SameMission | RandomMissions, roster: PolicyRoster
+) -> Iterator[Finding]:
+    """A schema that does not fit the missions, and what is not known of missions in the field."""
+    in_field = Study("-", missions, (), 1).in_field
+    if in_field != (document.get("schema") == SCHEMA):
+        problem = f"does not fit: these missions are {'in the field' if in_field else 'plain'}"
+        yield Finding(("schema",), problem, f"say schema = {SCHEMA if in_field else PLAIN_SCHEMA}")
+    if not in_field:
+        return
+    if document.get("bound") is True:
+        yield Finding(("bound",), "no bound is known of missions in the field", "say bound = false")
+    names = document.get("policies")
+    for index, name in enumerate(names if isinstance(names, list) else ()):
+        if isinstance(name, str) and roster.fault(name) is None and not roster.in_field(name):
+            known = ", ".join(roster.names(in_field=True))
+            yield Finding(
+                ("policies", index), "does not heed the field's constraints", f"give one of {known}"
+            )
 
 
 def _wrong_ids(document: Document, missions: SameMission | RandomMissions) -> Iterator[Finding]:
@@ -265,7 +323,7 @@ def format_study(study: Study, scenario: str) -> str:
     The file ``scenario`` beside it holds the mission, where every trial flies the same.
     """
     head = [
-        f"schema = {SCHEMA}",
+        f"schema = {SCHEMA if study.in_field else PLAIN_SCHEMA}",
         f"name = {toml_string(study.name)}",
         f"trials = {study.trials}",
         f"seed = {study.seed}",
@@ -277,8 +335,10 @@ def format_study(study: Study, scenario: str) -> str:
     if study.reference is not None:
         head.insert(-1, f"reference = {toml_string(study.reference)}")
     match study.missions:
-        case RandomMissions(uavs, tasks):
-            mission = f"random = {{ uavs = {uavs}, tasks = {tasks} }}"
+        case RandomMissions(uavs, tasks, shape):
+            more = {} if shape is None else {n: getattr(shape, n) for n in FIELD_NUMBERS}
+            inner = "".join(f", {name} = {toml_float(value)}" for name, value in more.items())
+            mission = f"random = {{ uavs = {uavs}, tasks = {tasks}{inner} }}"
         case SameMission():
             mission = f"scenario = {toml_string(scenario)}"
     blocks = [head, ["[mission]", mission], ["[uncertainty]", *_uncertainty_lines(study)]]

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 from sim.study.statistics import Estimate
 from sim.study.summary import PointSummary, StudySummary
 from sim.study.trial import BOUND
+from sim.study.field_generator import FieldShape
 from sim.world.uncertainty import Uncertainty
 
 if TYPE_CHECKING:
@@ -38,7 +39,7 @@ class Quantity:
     @property
     def label(self) -> str:
         """Name and unit, for an axis."""
-        return f"{self.name} [{self.unit}]"
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
 
     def shown(self, value: float) -> float:
         """``value`` in the unit."""
@@ -46,7 +47,7 @@ class Quantity:
 
     def text(self, value: float) -> str:
         """``value`` with its unit: 30 %, 0.5 per min."""
-        return f"{self.shown(value):g} {self.unit.split(' of')[0]}"
+        return f"{self.shown(value):g} {self.unit.split(' of')[0]}".rstrip()
 
 
 QUANTITIES = {
@@ -75,6 +76,34 @@ QUANTITIES = {
     "partition_s": Quantity("length of a partition", "s", "for {} s each"),
 }
 """By field of `Uncertainty`."""
+FIELD_QUANTITIES = {
+    "endurance_frac": Quantity("endurance", "% of a list", "batteries last for {} % of a list"),
+    "bases": Quantity("bases", "", "{} bases"),
+    "slots": Quantity("slots of a base", "", "{} slots at each"),
+    "swap_s": Quantity("swap of a battery", "s", "a swap takes {} s"),
+    "zones": Quantity("zones", "", "{} zones"),
+    "windows_frac": Quantity("tasks with windows", "%", "{} % of the tasks have windows"),
+    "due_frac": Quantity("tasks that are due", "%", "{} % of the tasks are due"),
+    "lines_frac": Quantity("tasks that are lines", "%", "{} % of the tasks are lines"),
+    "steady_wind_m_s": Quantity("known wind", "m/s", "a known wind of {} m/s"),
+    "acceleration_m_s2": Quantity("acceleration", "m/s²", "accelerations of {} m/s²"),
+}
+"""By field of `FieldShape`."""
+
+
+def quantity_of(name: str) -> Quantity:
+    """What is varied under that name."""
+    return QUANTITIES.get(name) or FIELD_QUANTITIES[name]
+
+
+def shape_words(shape: FieldShape) -> str:
+    """What constrains random missions, in one clause."""
+    clauses = []
+    for name, quantity in FIELD_QUANTITIES.items():
+        value = getattr(shape, name)
+        if value > 0.0 and (shape.bases or name not in ("slots", "swap_s")):
+            clauses.append(quantity.words.format(f"{quantity.shown(value):g}"))
+    return ", ".join(clauses) or "no constraints"
 
 
 def uncertainty_words(uncertainty: Uncertainty) -> str:

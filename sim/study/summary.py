@@ -33,6 +33,8 @@ _COUNTED = (
     "released",
     "messages",
     "decisions",
+    "required_left",
+    "breaches",
 )
 """Columns of rows of which means are taken."""
 _ROUNDING = 1e-9

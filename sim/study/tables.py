@@ -17,10 +17,10 @@ from sim.study.statistics import Estimate
 from sim.study.style import (
     IDEAL,
     NONE,
-    QUANTITIES,
     interval_text,
     number_text,
     policy_label,
+    quantity_of,
     spread_text,
     trials_text,
     uncertainty_words,
@@ -99,10 +99,12 @@ def _of_setting(summary: StudySummary, setting: PointSummary) -> Iterator[Result
     if any(each.trials != setting.trials for each in found):
         columns.append(("trials", lambda each: str(each.trials)))
     yield _grid(summary, f"Value{where} ({trials_text([setting])})", found, columns)
+    flown = [each for each in found if each.means]
+    in_field = any("breaches" in each.means for each in flown)
     yield _grid(
         summary,
         f"Per mission{where}",
-        [each for each in found if each.means],
+        flown,
         [
             ("done", _mean("done")),
             ("failed", _mean("failed")),
@@ -113,6 +115,8 @@ def _of_setting(summary: StudySummary, setting: PointSummary) -> Iterator[Result
             ("epochs", _mean("epochs")),
             ("messages", _mean("messages")),
             ("makespan [s]", _mean("makespan_s")),
+            *([("required left", _mean("required_left"))] if in_field else []),
+            *([("breaches", _mean("breaches"))] if in_field else []),
         ],
     )
 
@@ -138,7 +142,7 @@ def _times(summary: StudySummary, setting: PointSummary) -> ResultTable | None:
 
 def _against(summary: StudySummary, vary: str, settings: Sequence[PointSummary]) -> ResultTable:
     """Ratios against the values of one quantity."""
-    quantity = QUANTITIES[vary]
+    quantity = quantity_of(vary)
     rows = [
         (
             policy_label(summary, name),
@@ -216,7 +220,7 @@ def _where(summary: StudySummary, setting: PointSummary) -> str:
     """Which setting it is, for a title."""
     if setting.at is None:
         return ", the study's own setting" if summary.varied else ""
-    quantity = QUANTITIES[setting.vary]
+    quantity = quantity_of(setting.vary)
     return f", {quantity.name}: {quantity.text(setting.at)}"
 
 

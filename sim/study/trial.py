@@ -16,6 +16,7 @@ from sim.study.design import DesignPoint, Study, fate_seed, span_s
 from sim.study.policies.roster import PolicyRoster
 from sim.world.outcome import FlightOutcome, Score, score
 from swarm.model import Mission, Plan
+from swarm.protocol.board import is_of_field
 from swarm.runtime.clock import Clock
 
 BOUND = "clairvoyant"
@@ -56,6 +57,10 @@ class TrialRow:
     """None where nothing was decided; the wall times alone differ from run to run [s]."""
     decision_p99_wall_s: float | None = None
     decision_max_wall_s: float | None = None
+    required_left: int | None = None
+    """In the field: tasks without due time that appeared, were not withdrawn, and were not done."""
+    breaches: int | None = None
+    """In the field: what vehicles truly did against energy, zones, windows and slots."""
 
     @property
     def key(self) -> tuple[int, int, str]:
@@ -63,7 +68,14 @@ class TrialRow:
         return self.point, self.trial, self.policy
 
 
-COLUMNS = tuple(field.name for field in fields(TrialRow))
+FIELD_COLUMNS = ("required_left", "breaches")
+"""Of studies in the field alone."""
+COLUMNS = tuple(field.name for field in fields(TrialRow) if field.name not in FIELD_COLUMNS)
+
+
+def columns_of(study: Study) -> tuple[str, ...]:
+    """What the rows of a study have."""
+    return (*COLUMNS, *FIELD_COLUMNS) if study.in_field else COLUMNS
 
 
 def row_of(
@@ -79,6 +91,8 @@ def row_of(
         trial=trial,
         policy=policy,
         **asdict(scored),
+        required_left=flight.required_left,
+        breaches=flight.breaches,
         epochs=flight.epochs,
         moved=flight.moved,
         released=flight.released,
@@ -136,18 +150,24 @@ class TrialRunner:
         self._study = study
         self._clock = clock
         self._points = study.points()
-        self._policies = [(name, briefing.roster.policy(name)) for name in study.policies]
+        roster = briefing.roster
+        self._policies = [(name, roster.policy(name)) for name in study.policies]
+        self._in_field = (
+            [(name, roster.policy(name, in_field=True)) for name in study.policies]
+            if study.in_field
+            else []
+        )
         self._bound = briefing.roster.make_bound() if study.bound else None
         self._plans: deque[tuple[Mission, str, Plan]] = deque(maxlen=_PLANS_KEPT)
 
     def fly(self, job: TrialJob) -> list[TrialRow]:
         """The rows of one job, at every point that it stands for."""
-        mission = self._study.mission(job.trial)
         world = self._points[job.world]
+        mission = self._study.mission(job.trial, world.missions)
         seed = fate_seed(self._study.seed, job.trial)
         fate = world.uncertainty.draw(mission, span_s(mission), seed)
         rows: list[TrialRow] = []
-        for name, policy in self._policies:
+        for name, policy in self._in_field if is_of_field(mission) else self._policies:
             flight = policy.fly(fate, self._plan, self._clock)
             row = row_of(world, job.trial, name, score(fate, flight), flight)
             rows.append(row)

@@ -49,6 +49,10 @@ class FlightOutcome:
     """Sent by all processes; 0 where none are modelled."""
     decision_s: tuple[float, ...] = ()
     """Wall time of each decision or plan [s]; the one thing that differs from run to run."""
+    required_left: int | None = None
+    """Tasks without due time that were there and not done; None where no constraints count."""
+    breaches: int | None = None
+    """What vehicles did against the field's constraints; None where none count."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,7 +23,7 @@ _Ints = npt.NDArray[np.int32]
 _Ranks = npt.NDArray[np.int64]
 _Bools = npt.NDArray[np.bool_]
 
-FieldRuleCode = Literal[0, 1]
+FieldRuleCode = Literal[0, 1, 2, 3]
 FIELD_GREEDY: FieldRuleCode = 0
 """The open task with the largest p·S·m·(until − end) among those that it can do next; else to a
 base, after which it could do one; else home."""
@@ -31,6 +31,10 @@ FIELD_LOOKAHEAD: FieldRuleCode = 1
 """The first item of the UAV's own best list over all open tasks, as if it were alone and every slot
 free: exact up to `EXACT_OWN_TASKS` tasks that it is capable of, beyond greedy's list improved by
 insertions and moves. Where that is a base without a slot in time it decides like greedy."""
+FIELD_NEAREST: FieldRuleCode = 2
+"""As greedy, but the task whose work can begin soonest."""
+FIELD_VALUE_PER_TIME: FieldRuleCode = 3
+"""As greedy, but the task with the most p·m for each second until its end."""
 
 EXACT_OWN_TASKS = 10
 
@@ -169,7 +173,7 @@ def fly_lists(
     """
     flat = np.array(list(chain.from_iterable(lists)), dtype=np.int32)
     offsets = np.cumsum([0, *(len(items) for items in lists)], dtype=np.int64)
-    return FlownLists(*_kernels.field_fly_lists(problem, *_arrays(team), flat, offsets))
+    return FlownLists(*_kernels.field_fly_lists(problem, *team_arrays(team), flat, offsets))
 
 
 def run_rule(
@@ -194,7 +198,7 @@ def run_rule(
             certain; some that are told after it are not.
     """
     of = -1 if first is None else first
-    return FieldRuns(*_kernels.field_run_rule(problem, *_arrays(team), rule, of, should_stop))
+    return FieldRuns(*_kernels.field_run_rule(problem, *team_arrays(team), rule, of, should_stop))
 
 
 def decide(
@@ -204,15 +208,16 @@ def decide(
 
     Of the others it is read who stands at which base until when.
     """
-    found = _kernels.field_decide(problem, *_arrays(team), uav, rule)
+    found = _kernels.field_decide(problem, *team_arrays(team), uav, rule)
     return None if found is None else FieldStep(*found)
 
 
-def _arrays(
+def team_arrays(
     team: FieldTeamArrays,
 ) -> tuple[
     _Floats, _Floats, _Floats, _Floats, _Bools, _Bools, _Ints, _Ranks, _Floats, _Ints, _Floats
 ]:
+    """What the kernels are told of a team, in their order."""
     return (
         team.free_s,
         team.sortie_end_s,

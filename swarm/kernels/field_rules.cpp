@@ -11,10 +11,21 @@ namespace {
 
 constexpr double kNever = std::numeric_limits<double>::infinity();
 constexpr int kMostRuns = 200;
+constexpr double kShortestS = 1e-9;  // a task on the spot without service comes before all others
 
 // Of some ten nanoseconds, about as many as a decision takes.
 std::int64_t steps_of(FieldRule rule, std::size_t n_open) {
-    return static_cast<std::int64_t>(n_open) * (rule == FieldRule::kGreedy ? 2 : 10'000);
+    return static_cast<std::int64_t>(n_open) * (rule == FieldRule::kLookahead ? 10'000 : 2);
+}
+
+// What the rule makes of a task done at these times; the largest is taken.
+double score_of(FieldRule rule, const Progress& before, double weight, double until_s,
+                const Times& times) {
+    if (rule == FieldRule::kNearest) return before.time_s - times.begin_s;
+    if (rule == FieldRule::kValuePerTime) {
+        return weight / std::max(times.end_s - before.time_s, kShortestS);
+    }
+    return (before.survived * weight) * (until_s - times.end_s);
 }
 
 }  // namespace
@@ -91,11 +102,12 @@ double BaseTraffic::begin_s(const FieldProblem& problem, int base, const Arrival
 FieldChoice FieldDecider::decide(FieldRule rule, const FieldView& view, BaseTraffic& traffic,
                                  Swaps swaps) {
     if (rule == FieldRule::kLookahead) return lookahead(view, traffic, swaps);
-    return by_greedy(view, traffic, swaps);
+    return by_score(rule, view, traffic, swaps);
 }
 
-FieldChoice FieldDecider::by_greedy(const FieldView& view, BaseTraffic& traffic, Swaps swaps) {
-    const FieldChoice choice = greedy(view);
+FieldChoice FieldDecider::by_score(FieldRule rule, const FieldView& view, BaseTraffic& traffic,
+                                   Swaps swaps) {
+    const FieldChoice choice = task(rule, view);
     return choice.home && swaps == Swaps::kNow ? base(view, traffic) : choice;
 }
 
@@ -121,7 +133,7 @@ FieldChoice FieldDecider::lookahead(const FieldView& view, BaseTraffic& traffic,
     } else {
         refusal = do_task(problem, view.uav, choice.item, progress, choice.times);
     }
-    return refusal == Refusal::kNone ? choice : by_greedy(view, traffic, swaps);
+    return refusal == Refusal::kNone ? choice : by_score(FieldRule::kGreedy, view, traffic, swaps);
 }
 
 bool FieldDecider::KnownPlan::answers(const FieldView& view, bool swaps) const {
@@ -155,8 +167,8 @@ std::vector<Item> FieldDecider::greedy_list(const FieldView& view, bool may_swap
     int here = view.here, n_since_task = 0;
     while (!open.empty()) {
         const FieldChoice choice =
-            by_greedy({problem, open, view.uav, view.rank, progress, here}, nobody_,
-                      may_swap && n_since_task < problem.n_base ? Swaps::kNow : Swaps::kNever);
+            by_score(FieldRule::kGreedy, {problem, open, view.uav, view.rank, progress, here}, nobody_,
+                     may_swap && n_since_task < problem.n_base ? Swaps::kNow : Swaps::kNever);
         if (choice.home) break;
         Times times;
         if (do_item(problem, view.uav, choice.item, progress, times) != Refusal::kNone) break;
@@ -171,7 +183,7 @@ std::vector<Item> FieldDecider::greedy_list(const FieldView& view, bool may_swap
     return list;
 }
 
-FieldChoice FieldDecider::greedy(const FieldView& view) const {
+FieldChoice FieldDecider::task(FieldRule rule, const FieldView& view) const {
     const FieldProblem& problem = view.problem;
     FieldChoice best;
     for (const int task : view.open) {
@@ -183,7 +195,7 @@ FieldChoice FieldDecider::greedy(const FieldView& view) const {
             if (do_task(problem, view.uav, item, progress, times) != Refusal::kNone) continue;
             const double weight = problem.weight[problem.at(view.uav, task)];
             const double score =
-                (view.progress.survived * weight) * (problem.until_s[task] - times.end_s);
+                score_of(rule, view.progress, weight, problem.until_s[task], times);
             if (found.home || score > found.score) {
                 found = {false, item, true, false, score, 0.0, times};
             }

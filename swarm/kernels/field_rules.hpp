@@ -16,15 +16,15 @@
 
 namespace peckorder {
 
-enum class FieldRule : int { kGreedy = 0, kLookahead = 1 };
+enum class FieldRule : int { kGreedy = 0, kLookahead = 1, kNearest = 2, kValuePerTime = 3 };
 
 // What a UAV does next.
 struct FieldChoice {
     bool home = true;  // nothing more
     Item item = 0;
     bool has_score = false, has_second = false;  // scores are of tasks
-    double score = 0.0, second = 0.0;  // greedy: p·S·m·(until - end) of it, and of the next best
-                                       // task; lookahead: what the own list is worth
+    double score = 0.0, second = 0.0;  // by the rule, of it and of the next best task; lookahead:
+                                       // what the own list is worth
     Times times{};                     // of a base as far as others are known to wait there
 };
 
@@ -97,11 +97,12 @@ class FieldDecider {
         bool answers(const FieldView& view, bool swaps) const;
     };
 
-    FieldChoice by_greedy(const FieldView& view, BaseTraffic& traffic, Swaps swaps);
+    // The open task with the largest score; else to a base, if a swap opens one; else home.
+    FieldChoice by_score(FieldRule rule, const FieldView& view, BaseTraffic& traffic, Swaps swaps);
     FieldChoice lookahead(const FieldView& view, BaseTraffic& traffic, Swaps swaps);
     const OwnPlan& own_list(const FieldView& view, bool may_swap);
     std::vector<Item> greedy_list(const FieldView& view, bool may_swap);
-    FieldChoice greedy(const FieldView& view) const;
+    FieldChoice task(FieldRule rule, const FieldView& view) const;
     FieldChoice base(const FieldView& view, BaseTraffic& traffic);
     bool opens_any(const FieldView& view, const Progress& progress) const;
 

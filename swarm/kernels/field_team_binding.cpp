@@ -22,7 +22,9 @@ using Size = std::size_t;
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
 FieldRule checked_rule(int code) {
-    if (code != 0 && code != 1) refuse("rule must be 0 (greedy) or 1 (lookahead)");
+    if (code < 0 || code > 3) {
+        refuse("rule must be 0 (greedy), 1 (lookahead), 2 (nearest) or 3 (value per time)");
+    }
     return static_cast<FieldRule>(code);
 }
 

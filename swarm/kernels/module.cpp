@@ -15,4 +15,5 @@ NB_MODULE(_kernels, module) {
     peckorder::bind_field_team(module);
     peckorder::bind_field_search(module);
     peckorder::bind_field_alone(module);
+    peckorder::bind_field_insertion(module);
 }

@@ -15,6 +15,7 @@ from itertools import islice
 import numpy as np
 
 from swarm.allocation.field import FieldProblem
+from swarm.allocation.field.recent import problem_of
 from swarm.allocation.lower_level import Rule, TeamState
 from swarm.allocation.problem import BoolArray, Problem
 from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
@@ -201,7 +202,7 @@ class TaskBoard:
             return None
         mission = self.mission
         layers_m = [uav.layer_m for uav in brief.uavs]
-        return None if mission is None else FieldProblem.from_mission(mission, layers_m)
+        return None if mission is None else problem_of(mission, layers_m)
 
     def _problem_now(self) -> Problem | None:
         """Of `mission_of`; what nothing new was said of is not made anew."""

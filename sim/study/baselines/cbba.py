@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -194,33 +195,55 @@ def cbba(
     None. ``should_stop`` is given the rounds so far.
     """
     state = TeamState.at_start(problem) if state is None else state
-    auction = _Auction(problem, state)
-    # Bundles are bounded at first, to save work, for as long as that holds nobody back.
-    bound = 2 * -(-int(state.open.sum()) // max(1, int(state.active.sum()))) + 2
-    converged = auction.settle(bound, should_stop)
-    while converged and auction.holds_back(bound):
-        bound *= 2
-        converged = auction.settle(bound, should_stop)
+    eligible = problem.capable & state.open & state.active[:, None]
+    auction = Auction(Insertion(problem, state), eligible, state.active)
+    converged = auction.run(int(state.open.sum()), should_stop)
     routes, completed = _complete(problem, state, auction.paths_won())
     return CbbaResult(routes, auction.rounds, converged, completed)
 
 
-class _Auction:
-    """Beliefs, bundles and paths of all UAVs."""
+class Gains(Protocol):
+    """What a UAV's path gains by each task."""
 
-    def __init__(self, problem: Problem, state: TeamState) -> None:
+    def gains(self, uav: int, path: Sequence[int]) -> tuple[FloatArray, IntArray]:
+        """See `Insertion.gains`; -infinity for a task that is not bid for."""
+        ...
+
+
+class Auction:
+    """Beliefs, bundles and paths of all UAVs.
+
+    Args:
+        insertion: gives bids.
+        eligible: (n_uav, n_task) tasks that may be bid for.
+        active: (n_uav,) who takes part.
+    """
+
+    def __init__(self, insertion: Gains, eligible: BoolArray, active: BoolArray) -> None:
         self.rounds = 0
-        self._problem = problem
-        self._eligible: BoolArray = problem.capable & state.open & state.active[:, None]
-        self._insertion = Insertion(problem, state)
-        self._beliefs = Beliefs.blank(problem.n_uav, problem.n_task)
-        self._bundles: Routes = [[] for _ in range(problem.n_uav)]
-        self._paths: Routes = [[] for _ in range(problem.n_uav)]
-        self._active: list[int] = np.flatnonzero(state.active).tolist()
+        n_uav, n_task = eligible.shape
+        self._eligible = eligible
+        self._insertion = insertion
+        self._beliefs = Beliefs.blank(n_uav, n_task)
+        self._bundles: Routes = [[] for _ in range(n_uav)]
+        self._paths: Routes = [[] for _ in range(n_uav)]
+        self._active: list[int] = np.flatnonzero(active).tolist()
+
+    def run(self, n_open: int, should_stop: ShouldStop = never) -> bool:
+        """Hold it over ``n_open`` tasks to its end; False if stopped.
+
+        Bundles are bounded at first, to save work, for as long as that holds nobody back.
+        """
+        bound = 2 * -(-n_open // max(1, len(self._active))) + 2
+        converged = self.settle(bound, should_stop)
+        while converged and self.holds_back(bound):
+            bound *= 2
+            converged = self.settle(bound, should_stop)
+        return converged
 
     def settle(self, capacity: int, should_stop: ShouldStop) -> bool:
         """Alternate the phases until nothing changes; whether it came to that."""
-        stirred = set(range(self._problem.n_uav))
+        stirred = set(range(len(self._eligible)))
         while stirred:
             if should_stop(self.rounds):
                 return False

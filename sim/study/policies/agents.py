@@ -8,17 +8,21 @@ steps of an agent in which it decided.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from agent.core.agent_core import AgentCore
+from agent.core.field_decision import FieldRuleMaker, field_rule_of
 from agent.core.interface import Action, Event
+from sim.faults.field_judge import FieldJudge
 from sim.study.policies.roster import Planner
-from sim.world.outcome import FlightOutcome
+from sim.world.outcome import FlightOutcome, TaskVisit
 from sim.world.stochastic_world import StochasticWorld
 from sim.world.uncertainty import Realization
 from swarm.model import Mission, Plan
+from swarm.protocol.board import is_of_field
 from swarm.protocol.events import LogLine
 from swarm.runtime.clock import Clock
 
@@ -55,31 +59,67 @@ class AgentsPolicy:
 
     def fly(self, fate: Realization, plan: Planner, clock: Clock) -> FlightOutcome:
         """Fly a mission to its end; see `sim.study.policies.roster.Policy`."""
+        lost_s = self.coordinator_lost_s
+        return fly_agents(fate, plan, clock, method=self.method, coordinator_lost_s=lost_s)
 
-        def make_plan(mission: Mission, method: str, seed: int) -> Plan:
-            del seed  # the planner has its own
-            return plan(mission, method)
 
-        taken_s: list[float] = []
-        flown = StochasticWorld(
-            fate,
-            make_plan,
-            method=self.method,
-            seed=fate.seed,
-            coordinator_lost_s=self.coordinator_lost_s,
-            make_agent=partial(_TimedAgent, clock=clock, taken_s=taken_s),
-        )
-        flown.run()
-        tally = flown.tally
-        return FlightOutcome(
-            visits=tuple(tally.visits),
-            lost_uavs=tuple(flown.lost),
-            epochs=tally.epochs,
-            moved=tally.moved,
-            released=tally.released,
-            messages=tally.messages,
-            decision_s=tuple(taken_s),
-        )
+def fly_agents(
+    fate: Realization,
+    plan: Planner,
+    clock: Clock,
+    *,
+    method: str,
+    coordinator_lost_s: float | None,
+    make_rule: FieldRuleMaker = field_rule_of,
+) -> FlightOutcome:
+    """Fly a mission to its end with the real agents.
+
+    Args:
+        fate: what happens.
+        plan: makes the offline plan, by method.
+        clock: times decisions.
+        method: of that plan.
+        coordinator_lost_s: mission time at which the coordinator dies [s]; None if it lives.
+        make_rule: what agents decide by in the field.
+    """
+
+    def make_plan(mission: Mission, method: str, seed: int) -> Plan:
+        del seed  # the planner has its own
+        return plan(mission, method)
+
+    taken_s: list[float] = []
+    flown = StochasticWorld(
+        fate,
+        make_plan,
+        method=method,
+        seed=fate.seed,
+        coordinator_lost_s=coordinator_lost_s,
+        make_agent=partial(_TimedAgent, clock=clock, taken_s=taken_s, make_field_rule=make_rule),
+    )
+    flown.run()
+    tally = flown.tally
+    in_field = is_of_field(fate.mission)
+    return FlightOutcome(
+        visits=tuple(tally.visits),
+        lost_uavs=tuple(flown.lost),
+        epochs=tally.epochs,
+        moved=tally.moved,
+        released=tally.released,
+        messages=tally.messages,
+        decision_s=tuple(taken_s),
+        required_left=_required_left(fate, tally.visits) if in_field else None,
+        breaches=len(FieldJudge(flown.world).complaints()) if in_field else None,
+    )
+
+
+def _required_left(fate: Realization, visits: Collection[TaskVisit]) -> int:
+    """Tasks without due time that were there to the end and were not done."""
+    done = {visit.task for visit in visits if visit.done}
+    gone = fate.withdrawn_at_s
+    return sum(
+        task.due_s is None and task.id not in done and task.id not in gone
+        for task in fate.mission.tasks
+    )
 
 
 GREEDY = AgentsPolicy("greedy", "the paper's greedy rule, best sequence, no coordinator", "greedy")

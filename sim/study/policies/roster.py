@@ -54,6 +54,9 @@ class PolicyEntry:
     """What that number is, with its unit; empty for a policy without."""
     ideal: bool = False
     """Whether it is modelled with ideal communication only."""
+    field: str = ""
+    """In `sim.study.policies.field_agents`, what flies missions in the field; the same as for plain
+    ones when empty, nothing when ``-``."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +84,16 @@ class PolicyRoster:
             return f"{name!r} has no number > 0 behind the colon", right
         return None
 
-    def policy(self, name: str) -> Policy:
-        """The policy of that name.
+    def in_field(self, name: str) -> bool:
+        """Whether the policy of that name flies missions in the field."""
+        return self.policies[name.partition(":")[0]].field != _NOWHERE
+
+    def names(self, *, in_field: bool) -> tuple[str, ...]:
+        """All, or those that fly missions in the field."""
+        return tuple(name for name in self.policies if not in_field or self.in_field(name))
+
+    def policy(self, name: str, *, in_field: bool = False) -> Policy:
+        """The policy of that name; the one for missions ``in_field`` if asked.
 
         Raises:
             ValueError: there is none.
@@ -91,7 +102,10 @@ class PolicyRoster:
         if self.fault(name) is not None:
             raise ValueError(f"no such policy: {name!r}")
         value = _positive(number)
-        policy: Policy = _made(self.policies[stem], *(() if value is None else (value,)))
+        entry = self.policies[stem]
+        if in_field and entry.field:
+            entry = PolicyEntry(_FIELD_AGENTS, entry.field)
+        policy: Policy = _made(entry, *(() if value is None else (value,)))
         return policy
 
     def ideal(self, name: str) -> bool:
@@ -121,6 +135,8 @@ def _made(entry: PolicyEntry, *arguments: float) -> Any:
 _PACKAGE = "sim.study.policies"
 _AGENTS, _DISPATCHERS = f"{_PACKAGE}.agents", f"{_PACKAGE}.dispatchers"
 _REPLANNING = f"{_PACKAGE}.replanning"
+_FIELD_AGENTS = f"{_PACKAGE}.field_agents"
+_NOWHERE = "-"
 
 ROSTER = PolicyRoster(
     policies={
@@ -128,13 +144,17 @@ ROSTER = PolicyRoster(
         "guided-alone": PolicyEntry(_AGENTS, "GUIDED_ALONE"),
         "greedy": PolicyEntry(_AGENTS, "GREEDY"),
         "lookahead": PolicyEntry(_AGENTS, "LOOKAHEAD"),
-        "central": PolicyEntry(_REPLANNING, "CENTRAL", ideal=True),
-        "central-divert": PolicyEntry(_REPLANNING, "CENTRAL_DIVERT", ideal=True),
-        "interval": PolicyEntry(_REPLANNING, "interval", parameter="an interval [s]", ideal=True),
-        "frozen": PolicyEntry(_DISPATCHERS, "FROZEN", ideal=True),
-        "cbba": PolicyEntry(_REPLANNING, "CBBA", ideal=True),
-        "nearest": PolicyEntry(_DISPATCHERS, "NEAREST_FIRST", ideal=True),
-        "value-per-time": PolicyEntry(_DISPATCHERS, "VALUE_PER_TIME_ONLINE", ideal=True),
+        "central": PolicyEntry(_REPLANNING, "CENTRAL", ideal=True, field="CENTRAL"),
+        "central-divert": PolicyEntry(_REPLANNING, "CENTRAL_DIVERT", ideal=True, field=_NOWHERE),
+        "interval": PolicyEntry(
+            _REPLANNING, "interval", parameter="an interval [s]", ideal=True, field=_NOWHERE
+        ),
+        "frozen": PolicyEntry(_DISPATCHERS, "FROZEN", ideal=True, field="FROZEN"),
+        "cbba": PolicyEntry(_REPLANNING, "CBBA", ideal=True, field="CBBA"),
+        "nearest": PolicyEntry(_DISPATCHERS, "NEAREST_FIRST", ideal=True, field="NEAREST"),
+        "value-per-time": PolicyEntry(
+            _DISPATCHERS, "VALUE_PER_TIME_ONLINE", ideal=True, field="VALUE_PER_TIME"
+        ),
     },
     bound=PolicyEntry(f"{_PACKAGE}.clairvoyant", "Clairvoyant"),
 )

@@ -5,13 +5,24 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from swarm.allocation.field.problem import FieldProblem
-from swarm.kernels.field import FIELD_GREEDY, FIELD_LOOKAHEAD, FieldRuleCode
+from swarm.kernels.field import (
+    FIELD_GREEDY,
+    FIELD_LOOKAHEAD,
+    FIELD_NEAREST,
+    FIELD_VALUE_PER_TIME,
+    FieldRuleCode,
+)
 
 FIELD_RULES: Mapping[str, FieldRuleCode] = {
     "greedy": FIELD_GREEDY,
     "lookahead": FIELD_LOOKAHEAD,
 }
 """Rules that decide item by item."""
+FIELD_INDEX_RULES: Mapping[str, FieldRuleCode] = {
+    "nearest": FIELD_NEAREST,
+    "value-per-time": FIELD_VALUE_PER_TIME,
+}
+"""Rules that studies compare them with; no plan is made by them."""
 GUIDED = "guided"
 """Follows the whole team's lists, which are searched anew at every decision."""
 
