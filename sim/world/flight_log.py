@@ -178,6 +178,10 @@ class FlightLog:
             case _:
                 pass
 
+    def stands(self, uav: str) -> bool:
+        """Whether it is on a slot of a base."""
+        return any(True for _ in self._here(uav))
+
     def made_room(self, uav: str, now_s: float) -> None:
         """Its slot is free again: it has taken off, or its agent says that it stands elsewhere."""
         for stay in self._here(uav):

@@ -18,6 +18,7 @@ import numpy as np
 from agent.core.agent_core import AgentCore
 from agent.core.interface import GoTo, VehicleReport
 from coordinator.mission_view.mission_state import MissionState
+from coordinator.operator.readiness import ReadyRequest
 from sim.world.engine import EventQueue, Process
 from sim.world.field_vehicle import vehicles_of
 from sim.world.motion import flown_s
@@ -70,8 +71,9 @@ ObserverMaker = Callable[[MissionState, Timing], Core[CommonEvent, CommonAction]
 class StochasticWorld:
     """One mission in virtual time, and all that befalls it.
 
-    The coordinator dies at the mission time ``coordinator_lost_s``, unless that is None; see
-    `World` for the others.
+    The coordinator dies at the mission time ``coordinator_lost_s``, unless that is None. A UAV that
+    is lost on a slot of a base is carried away after ``clears_slots_s``, as an operator tells all
+    then; with None it stands there for good. See `World` for the others.
     """
 
     def __init__(
@@ -84,8 +86,10 @@ class StochasticWorld:
         coordinator_lost_s: float | None = None,
         make_agent: Callable[..., AgentCore] = AgentCore,
         make_observer: ObserverMaker | None = None,
+        clears_slots_s: float | None = None,
     ) -> None:
         self.fate = fate
+        self._clears_slots_s = clears_slots_s
         self.lost: dict[UavId, str] = {}
         """UAVs lost on their mission, in that order, and why."""
         self.tally = Tally()
@@ -177,6 +181,14 @@ class StochasticWorld:
         if not self.world.processes[uav].over:
             self.lost[uav] = why
             self.world.lose(uav)
+            if self._clears_slots_s is not None:
+                self.world.queue.after(self._clears_slots_s, partial(self._clear_slot, uav))
+
+    def _clear_slot(self, uav: UavId) -> None:
+        world = self.world
+        if world.alive and world.flight_log.stands(uav):
+            world.flight_log.made_room(uav, world.queue.now_s())
+            world.operate(ReadyRequest(uav, "is lost, and carried away"))
 
     def _fall(self, uav: str) -> None:
         at_s = self.world.queue.now_s() - (self.world.zero_s or 0.0)

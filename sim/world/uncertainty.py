@@ -119,7 +119,7 @@ class Uncertainty:
         # Whether and when, one row each, so that more of them change nothing for the first ones.
         late = popups.random((len(mission.tasks), 2)).tolist()
         tasks = tuple(
-            replace(task, appears_s=0.5 * span_s * when)
+            _appearing(task, 0.5 * span_s * when)
             if draw < self.popup and task.appears_s == 0.0
             else task
             for task, (draw, when) in zip(mission.tasks, late, strict=True)
@@ -326,6 +326,19 @@ def _poisson_s(rng: np.random.Generator, rate_per_min: float, span_s: float) -> 
             times_s.append(time_s)
             time_s += float(rng.exponential(60.0 / rate_per_min))
     return times_s
+
+
+def _appearing(task: Task, appears_s: float) -> Task:
+    """``task`` as it is if it appears then: its window and due time as much later as it has been
+    open without anybody's knowledge."""
+    late_s = max(0.0, appears_s - task.opens_s)
+    return replace(
+        task,
+        appears_s=appears_s,
+        opens_s=task.opens_s + late_s if task.closes_s is not None else task.opens_s,
+        closes_s=None if task.closes_s is None else task.closes_s + late_s,
+        due_s=None if task.due_s is None else task.due_s + late_s,
+    )
 
 
 def _moved(task: Task, east_m: float, north_m: float) -> Task:

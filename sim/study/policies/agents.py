@@ -26,6 +26,9 @@ from swarm.protocol.board import is_of_field
 from swarm.protocol.events import LogLine
 from swarm.runtime.clock import Clock
 
+_CLEARS_SLOTS_S = 30.0
+"""Until who is lost on a slot of a base has been carried away."""
+
 
 class _TimedAgent(AgentCore):
     """An agent that notes how long it takes to decide."""
@@ -94,6 +97,7 @@ def fly_agents(
         method=method,
         seed=fate.seed,
         coordinator_lost_s=coordinator_lost_s,
+        clears_slots_s=_CLEARS_SLOTS_S,
         make_agent=partial(_TimedAgent, clock=clock, taken_s=taken_s, make_field_rule=make_rule),
     )
     flown.run()
