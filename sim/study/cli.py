@@ -121,9 +121,7 @@ def _summary(found: Study, rows: list[TrialRow], *, here: bool) -> StudySummary:
         again = found.mission(0).reattempt_failed
         missions += f", where failed tasks {'open again' if again else 'stay failed'}"
     machine = this_machine()
-    what = {
-        name: ROSTER.policy(name, in_field=found.in_field).what for name in found.policies
-    }
+    what = {name: ROSTER.policy(name, in_field=found.in_field).what for name in found.policies}
     if found.bound:
         what[BOUND] = ROSTER.make_bound().what
     about = StudyDescription(

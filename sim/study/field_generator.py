@@ -22,7 +22,7 @@ from swarm.allocation.legs import Airspace
 from swarm.allocation.legs.planner import PathPlanner
 from swarm.allocation.problem import Problem
 from swarm.kernels.field import FIELD_VALUE_PER_TIME, run_rule
-from swarm.model import Base, BaseId, Mission, Task, Zone, ZoneId
+from swarm.model import Base, BaseId, Mission, Task, TaskId, Zone, ZoneId
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -190,7 +190,10 @@ def _within_reach(
     if not shape.endurance_frac:
         return replace(mission, tasks=at(kept))
     longest_s = float(max(task.service_s for task in mission.tasks))
-    every = [replace(mission.tasks[0], id=f"p{k}", position_enu_m=(*place, 0.0)) for k, place in enumerate(places)]
+    every = [
+        replace(mission.tasks[0], id=TaskId(f"p{k}"), position_enu_m=(*place, 0.0))
+        for k, place in enumerate(places)
+    ]
     needs_s = np.sort(_sortie_s(FieldProblem.from_mission(mission, tasks=every)), axis=0)
     half_s = needs_s[len(mission.uavs) // 2] + longest_s
     for _ in range(_ROUNDS):

@@ -67,9 +67,7 @@ def read_rows(path: Path, columns: Sequence[str] = COLUMNS) -> list[TrialRow]:
     return rows
 
 
-def write_parquet(
-    folder: Path, rows: Sequence[TrialRow], columns: Sequence[str] = COLUMNS
-) -> Path:
+def write_parquet(folder: Path, rows: Sequence[TrialRow], columns: Sequence[str] = COLUMNS) -> Path:
     """Write all rows as Parquet, which needs the extra ``study``; gives the file.
 
     Raises:

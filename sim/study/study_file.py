@@ -27,7 +27,6 @@ from sim.study.field_generator import FieldShape
 from sim.study.policies.roster import PolicyRoster
 from sim.world.uncertainty import Uncertainty
 from swarm.model.ids import ID_RULE
-from swarm.protocol.board import is_of_field
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario, resolve_scenario
 from swarm.scenario.files import read_bytes
@@ -69,7 +68,7 @@ _RandomTable = create_model("_RandomTable", __base__=_SizeTable, **_SHAPE)
 
 class _MissionTable(StrictTable):
     scenario: Annotated[str, Field(min_length=1)] | None = None
-    random: _RandomTable | None = None  # type: ignore[valid-type]  # made above
+    random: _RandomTable | None = None
 
 
 class _VaryTable(StrictTable):

@@ -14,10 +14,10 @@ from pathlib import Path
 from textwrap import fill
 from typing import TYPE_CHECKING, Any, Literal
 
+from sim.study.field_generator import FieldShape
 from sim.study.statistics import Estimate
 from sim.study.summary import PointSummary, StudySummary
 from sim.study.trial import BOUND
-from sim.study.field_generator import FieldShape
 from sim.world.uncertainty import Uncertainty
 
 if TYPE_CHECKING:

@@ -1,4 +1,4 @@
-"""What each task would add to one UAV's list, for auctions; see `swarm.kernels.field_insertion.cpp`.
+"""What each task would add to one UAV's list, for auctions; see `field_insertion.cpp`.
 
 Where batteries are swapped and which way lines are flown follows from the order of the tasks, as in
 `swarm.kernels.field_search`. Who stands at a base now holds its slot until it is free; what

@@ -17,7 +17,6 @@ import numpy as np
 from agent.core.field_decision import FieldRule
 from sim.study.baselines.field_cbba import field_cbba
 from swarm.allocation.field import FieldProblem, FieldState
-from swarm.allocation.field.rules import item_lists
 from swarm.kernels.field import FIELD_VALUE_PER_TIME, run_rule
 from swarm.kernels.field_search import SearchedLists, optimise_lists
 
@@ -115,7 +114,7 @@ class AuctionCaptain(Captain):
 
     def rule(self, name: str, routes: Mapping[str, Sequence[str]]) -> FieldRule:
         """It has no plan to begin with."""
-        return super().rule(name, {uav: () for uav in routes})
+        return super().rule(name, dict.fromkeys(routes, ()))
 
     def answer(self, problem: FieldProblem, state: FieldState) -> SearchedLists:
         """What was won, of it what can still be done."""
