@@ -177,6 +177,8 @@ def _first_of_lists(
     if not found.lists[mine]:
         return None
     flown = fly_lists(problem.kernel, state, found.lists)
+    if not flown.done[mine]:  # lists made elsewhere may not heed who is at the bases
+        return None
     row = sum(len(items) for items in found.lists[:mine])
     times_s = tuple(flown.times_s[row].tolist())
     return _told(problem, state, mine, found.lists[mine][0], times_s, found.objective, None)

@@ -167,5 +167,6 @@ def _with_gap_filled(
     rest = replace(state, open=free)
     runs = run_rule(problem.kernel, rest, FIELD_VALUE_PER_TIME, first=mine)
     own = runs.items[runs.uavs == mine][:1].tolist()
-    lists = tuple(tuple(own) if row == mine else items for row, items in enumerate(found.lists))
+    # As any rule, this one knows of the others who stands at bases now, and no more.
+    lists = tuple(tuple(own) if row == mine else () for row in range(problem.n_uav))
     return replace(found, lists=lists)
