@@ -177,7 +177,10 @@ def _free(
 def _within_reach(
     mission: Mission, places: Sequence[tuple[float, float]], shape: FieldShape
 ) -> Mission:
-    """The mission with batteries, its tasks at the first places that half of its UAVs can serve."""
+    """The mission with batteries, its tasks at the first places that half of its UAVs can serve.
+
+    Where there are not enough of these, the nearest others take their place.
+    """
     count = len(mission.tasks)
 
     def at(indices: Sequence[int]) -> tuple[Task, ...]:

@@ -88,7 +88,7 @@ _UncertaintyTable = create_model("_UncertaintyTable", __base__=StrictTable, **_U
 
 
 class _StudyTable(StrictTable):
-    version: Annotated[int, known_schema(SCHEMA)] = Field(alias="schema")
+    version: Annotated[int, known_schema(PLAIN_SCHEMA, SCHEMA)] = Field(alias="schema")
     name: Id
     trials: _Trials = DEFAULT_TRIALS
     seed: Annotated[int, Field(ge=0, le=MOST_SEED)] = 0

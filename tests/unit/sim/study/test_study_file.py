@@ -98,7 +98,11 @@ def test_scenario_beside_the_file_wins_over_a_shipped_one(tmp_path: Path) -> Non
 @pytest.mark.parametrize(
     ("change", "expected"),
     [
-        (("schema = 1", "schema = 2"), "s.toml: schema: version 2 of the format is not known; "),
+        (("schema = 1", "schema = 3"), "s.toml: schema: version 3 of the format is not known; "),
+        (
+            ("schema = 1", "schema = 2"),
+            "s.toml: schema: does not fit: these missions are plain; say schema = 1",
+        ),
         (("schema = 1\n", ""), "s.toml: schema: is missing; give schema = 1"),
         (('"mine"', '"a b"'), "s.toml: name: 'a b' is not an id; give an id of "),
         (('"mine"', '"mine"\ntrails = 9'), "s.toml: trails: unknown key; did you mean 'trials'?"),

@@ -62,6 +62,23 @@ def test_losses_do_not_change_which_tasks_pop_up(valley: Mission) -> None:
     assert set(rough.lost_at_s) == {uav.id for uav in valley.uavs}
 
 
+def test_windows_and_due_times_move_with_what_appears_after_they_began(valley: Mission) -> None:
+    first, second, third = valley.tasks[:3]
+    timed = (
+        replace(first, closes_s=10.0, due_s=15.0),
+        replace(second, opens_s=500.0, closes_s=600.0),
+        replace(third, opens_s=5.0),
+    )
+
+    fate = Uncertainty(popup=1.0).draw(replace(valley, tasks=timed), 100.0, seed=7)
+
+    late, early, endless = fate.mission.tasks
+    assert 0.0 < late.appears_s == late.opens_s < 50.0
+    assert (late.closes_s, late.due_s) == (10.0 + late.appears_s, 15.0 + late.appears_s)
+    assert (early.opens_s, early.closes_s) == (500.0, 600.0)
+    assert endless.opens_s == 5.0
+
+
 def test_moments_lie_within_the_mission(valley: Mission) -> None:
     fate = Uncertainty(loss=1.0, popup=1.0).draw(valley, 100.0, 5)
 
