@@ -249,6 +249,9 @@ class CoordinatorCore:
                 self._state_query.want(now_s, before_deciding=True)
         elif writer in self.replica.writers():
             self._state_query.want(now_s)
+        elif self.replica.brief is not None and writer in {u.id for u in self.replica.brief.uavs}:
+            # Nothing is known of it: it has to have the time to say what it is about.
+            self._mission.end_condition.wait_until(now_s + self._timing.relink_grace_s)
 
     def _give_up_lost(self, now_s: float) -> None:
         anybody_lost = False

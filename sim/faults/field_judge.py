@@ -93,12 +93,12 @@ class FieldJudge:
                 since_s = drawn.heeded_by_s(uav, self.reaction_s)
                 if since_s == math.inf:
                     continue
-                chords = _chords_in(track.pieces(since_s, drawn.until_s), drawn.zone, forbidden)
                 leaves_s = self._leaves_s(uav, since_s, forbidden) if drawn.since_s > 0.0 else 0.0
-                outside = leaves_s == 0.0
-                for begin_s, end_s, enters in chords:
+                outside, cut_s = leaves_s == 0.0, min(max(since_s, leaves_s), drawn.until_s)
+                pieces = [*track.pieces(since_s, cut_s), *track.pieces(cut_s, drawn.until_s)]
+                for begin_s, enters in _chords_in(pieces, drawn.zone, forbidden):
                     outside = outside or not enters
-                    if enters and (outside or end_s > leaves_s):
+                    if enters and (outside or begin_s >= leaves_s):
                         yield f"{uav} in {drawn.zone.id} at {begin_s:.3f} s"
                         break
 
@@ -172,22 +172,20 @@ def _forbidden(zone: Zone, margin_m: float, astray_m: float) -> shapely.Geometry
 
 def _chords_in(
     pieces: Iterable[MotionPiece], zone: Zone, forbidden: shapely.Geometry
-) -> Iterator[tuple[float, float, bool]]:
-    """When each chord of a flight begins and ends [s], and whether it meets what is forbidden."""
+) -> Iterator[tuple[float, bool]]:
+    """When each chord of a flight begins [s], and whether it meets what is forbidden."""
     import shapely
 
     for piece in pieces:
         instants_s, places = _chords(piece)
         heights_m = [up_m for _, _, up_m in places]
         if not zone.concerns(min(heights_m), max(heights_m)):
-            yield piece.begin_s, piece.end_s, False
+            yield piece.begin_s, False
             continue
-        for (begin_s, end_s), (one, other) in zip(
-            pairwise(instants_s), pairwise(places), strict=True
-        ):
+        for begin_s, (one, other) in zip(instants_s, pairwise(places), strict=False):
             flat = one[:2], other[:2]
             chord = shapely.Point(flat[0]) if flat[0] == flat[1] else shapely.LineString(flat)
-            yield begin_s, end_s, bool(shapely.intersects(forbidden, chord))
+            yield begin_s, bool(shapely.intersects(forbidden, chord))
 
 
 def _chords(piece: MotionPiece) -> tuple[list[float], list[Point]]:

@@ -120,7 +120,7 @@ def doable_in_field(
         problem: of this board.
         board: the registers.
         present: the writers believed alive; the lost take no part.
-        mission_s: now [s mission time]: nobody departs before.
+        mission_s: now [s mission time]: nobody departs before, but who has just ended a task.
     """
     claims = {
         uav: claim
@@ -135,7 +135,10 @@ def doable_in_field(
     }
     state = field_state(problem, board, counting, present=claims)
     state.active[:] = [uav in claims for uav in problem.uav_ids]
-    np.maximum(state.free_s, mission_s, out=state.free_s)
+    outcomes = board.replica.outcomes
+    # Who has told of its outcome has gone on already: the word of where to is on its way.
+    chosen = [uav in claims and (uav, claims[uav].task) in outcomes for uav in problem.uav_ids]
+    np.maximum(state.free_s, mission_s, out=state.free_s, where=~np.array(chosen, dtype=np.bool_))
     can: npt.NDArray[np.bool_] = np.any(np.isfinite(earliest_alone(problem.kernel, state)), axis=0)
     states = board.states
     return [

@@ -28,6 +28,9 @@ TOUCH_M = 1e-6
 _FAR_M = 1e8
 """Where the world ends that an inclusive zone keeps out of [m]."""
 
+_BORDER_PIECES = 256
+"""Of a border, of which each is tried as a way out where the nearest will not do."""
+
 _ROUND_STEPS = 64
 """Chords per quarter of a circle where a shape is needed, not a distance."""
 
@@ -130,15 +133,26 @@ class Obstacles:
         point = shapely.Point(place_m)
         out = shapely.shortest_line(self._border, point)
         if self._enters(out, point):
-            holds = shapely.intersects(self._solids_with_margin, point)
-            within, others = self._solids_with_margin[holds], self._solids_with_margin[~holds]
-            border = shapely.boundary(shapely.union_all(within))
-            border = shapely.difference(border, shapely.union_all(others))
-            other = shapely.shortest_line(border, point)
-            if other is not None and not other.is_empty and not self._enters(other, point):
-                out = other
+            ways = self._ways_out(point)
+            out = next((way for way in ways if not self._enters(way, point)), out)
         out_m = np.array(out.coords[0])
         return out_m if self.free(out_m[None])[0] else np.array(place_m, dtype=np.float64)
+
+    def _ways_out(self, point: shapely.Geometry) -> list[shapely.Geometry]:
+        """Straight ways to every piece of the border of what the place is in, shortest first."""
+        import shapely
+
+        holds = shapely.intersects(self._solids_with_margin, point)
+        border = shapely.boundary(shapely.union_all(self._solids_with_margin[holds]))
+        border = shapely.segmentize(border, max(border.length / _BORDER_PIECES, TOUCH_M))
+        others = shapely.union_all(self._solids_with_margin[~holds])
+        lines = shapely.get_parts(shapely.difference(border, others))
+        corners_m = [shapely.get_coordinates(line) for line in lines]
+        ends_m = [np.stack([each[:-1], each[1:]], axis=1) for each in corners_m]
+        if not ends_m:
+            return []
+        ways = shapely.shortest_line(shapely.linestrings(np.concatenate(ends_m)), point)
+        return list(ways[np.argsort(shapely.length(ways), kind="stable")])
 
     def _enters(self, way: shapely.Geometry, begin: shapely.Geometry) -> bool:
         """Whether ``way`` comes into a shape in which it does not begin."""

@@ -178,7 +178,7 @@ DRAWN = DrawnZone(ZONE, since_s=20.0, until_s=200.0)
     ("corners", "is_sound"),
     [
         pytest.param([(0, 95, 0), (20.1, 95, 0), (24, 85, 0)], True, id="leaves"),
-        pytest.param([(0, 95, 0), (27, 95, 0), (30, 85, 0)], True, id="leaves slowly"),
+        pytest.param([(0, 95, 0), (27, 95, 0), (30, 85, 0)], False, id="leaves slowly"),
         pytest.param([(0, 95, 0), (20.1, 95, 0)], False, id="stays"),
         pytest.param([(0, 95, 0), (24, 85, 0), (40, 85, 0), (44, 95, 0)], False, id="comes back"),
         pytest.param([(0, 0, 0), (19, 0, 0), (29, 100, 0), (34, 150, 0)], False, id="flies in"),
@@ -200,6 +200,38 @@ def test_who_hears_of_a_zone_late_has_until_then() -> None:
 
     assert broken(world, [replace(DRAWN, known_s={"u0": 60.0})]) == []
     assert broken(world, [replace(DRAWN, known_s={"u0": 30.0})]) == ["in a zone"]
+
+
+def test_who_turns_in_flight_may_be_astray_by_what_its_agent_does_not_know_yet() -> None:
+    world = on_a_way((0.0, 0.0, 8.5), (20.0, 200.0, 8.5))  # 1.5 m inside of the border
+    world.mission = replace(MISSION, zones=(ZONE,))
+
+    assert [each for each, _ in FieldJudge(world, stale_s=0.2).complaints()] == []
+    assert [each for each, _ in FieldJudge(world, stale_s=0.1).complaints()] == ["in a zone"]
+
+
+@pytest.mark.parametrize(
+    ("out_s", "uav", "slowed", "is_sound"),
+    [
+        pytest.param(1.0, {}, {}, True, id="at full speed"),
+        pytest.param(1.1, {}, {}, False, id="lingers"),
+        pytest.param(1.1, {}, {"u0": 0.8}, True, id="is slow"),
+        pytest.param(1.9, {"airspeed_m_s": 8.0}, {}, True, id="against the wind"),
+        pytest.param(2.1, {"airspeed_m_s": 8.0}, {}, False, id="lingers in the wind"),
+        # 10 / 5 s to stop 10 m farther in, then 2 · sqrt(20 / 5) s from rest to rest.
+        pytest.param(5.9, {"acceleration_m_s2": 5.0}, {}, True, id="stops first"),
+        pytest.param(6.1, {"acceleration_m_s2": 5.0}, {}, False, id="stops and lingers"),
+    ],
+)
+def test_who_is_in_a_zone_has_as_long_as_its_shortest_way_out_takes(
+    out_s: float, uav: dict[str, float], slowed: dict[str, float], is_sound: bool
+) -> None:
+    world = on_a_way((0.0, 100.0, 0.0), (25.0, 100.0, 0.0), (25.0 + out_s, 110.01, 0.0))
+    me = replace(MISSION.uavs[0], **uav)
+    world.mission = replace(MISSION, uavs=(me,), wind_enu_m_s=(0.0, 3.0))
+    complaints = FieldJudge(world, slowed=slowed).complaints([DRAWN])
+
+    assert [each for each, _ in complaints] == ([] if is_sound else ["in a zone"])
 
 
 SEEN = LastSeen(5.0, (10.0, 0.0, 10.0), 0.9, True)
@@ -250,3 +282,30 @@ def test_an_endless_battery_could_do_what_opens_late() -> None:
     seen = replace(SEEN, battery_frac=None)
 
     assert could(replace(NEAR, opens_s=500.0), seen, endless) == ["u0"]
+
+
+def test_a_base_on_whose_slots_the_lost_stand_swaps_nothing() -> None:
+    mission = replace(MISSION, uavs=(CHARGED,), tasks=(NEAR,), bases=(BASE,))
+    spent = {"u0": replace(SEEN, battery_frac=0.3)}
+
+    assert Chances(mission, 0.0).could_do(spent, ["near"]) == {"near": ["u0"]}
+    assert Chances(mission, 0.0, blocked=["b0"]).could_do(spent, ["near"]) == {}
+
+
+@pytest.mark.parametrize(
+    ("task", "battery_frac", "may"),
+    [
+        pytest.param(NEAR, 0.9, True, id="goes on"),
+        pytest.param(NEAR, 0.3, False, id="has no energy, and no time for a swap"),
+        pytest.param(replace(NEAR, due_s=12.0), 0.9, True, id="before it is due"),
+        pytest.param(replace(NEAR, due_s=9.5), 0.9, False, id="not before it is due"),
+        pytest.param(replace(NEAR, closes_s=8.5), 0.9, False, id="not before it closes"),
+    ],
+)
+def test_who_can_go_on_has_no_reason_to_leave_its_task(
+    task: Task, battery_frac: float, may: bool
+) -> None:
+    mission = replace(MISSION, uavs=(CHARGED,), tasks=(task,), bases=(BASE,))
+    seen = replace(SEEN, battery_frac=battery_frac)
+
+    assert Chances(mission, 0.0).can_go_on(seen, "u0", "near") is may

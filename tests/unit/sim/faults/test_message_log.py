@@ -154,6 +154,14 @@ def test_a_task_that_the_vehicle_refuses_may_be_left(told: Telling) -> None:
     assert told.broken == []
 
 
+def test_a_task_that_constraints_do_not_allow_any_more_may_be_left(told: Telling) -> None:
+    told.claim("u0", "t0")
+    told.message_log.gave_up("u0", "t0")
+    told.claim("u0", "t1")
+
+    assert told.broken == []
+
+
 def test_who_goes_home_may_leave_its_task_when_the_mission_has_ended(told: Telling) -> None:
     out = Claim(ClaimPhase.OUT, None, 0.0, 0, 0.0)
     told.claim("u0", "t0")

@@ -84,6 +84,20 @@ def test_lines_begin_where_they_are_flown_from() -> None:
     assert way.end_enu_m == (50.0, 200.0, 40.0)
 
 
+def test_a_zone_is_left_through_no_other_where_that_can_be() -> None:
+    around = Zone(ZoneId("around"), ((0.0, 500.0), (20.0, 500.0), (20.0, 520.0), (0.0, 520.0)))
+    beside = Zone(ZoneId("beside"), ((-1.0, 505.0), (2.0, 505.0), (2.0, 515.0), (-1.0, 515.0)))
+    mission = Mission("left", 1000.0, MISSION.uavs, MISSION.tasks, zones=(around, beside))
+    problem = FieldProblem.from_mission(mission)
+    network = problem.network
+
+    assert network is not None
+    out_m = network.way_out_m(1, (3.0, 510.0, 0.0))  # 4 m to the west through the other one
+    assert out_m is not None
+    assert abs(out_m[1] - 510.0) == pytest.approx(10.0, abs=0.05)
+    assert out_m[0] == pytest.approx(3.0, abs=0.5)
+
+
 def test_there_is_no_way_out_of_a_closed_ring() -> None:
     ring = Zone(
         ZoneId("ring"),

@@ -150,6 +150,17 @@ def test_what_somebody_claims_counts_as_doable() -> None:
     assert registers.doable("u1", now_s=99.0) == []
 
 
+def test_who_has_just_told_of_its_outcome_has_left_for_what_comes_next() -> None:
+    """From (100, 0) it is at the base just in time, at 50 s; there it swaps, for what is far."""
+    claim = Claim(ClaimPhase.HELD, "near", 0.0, 0, 10.0, sortie_end_s=50.0)
+    registers = Registers().say("u0", claim).say("u1", OUT)
+    registers.say("u0", Outcome("near", AttemptResult.DONE, 1, 10.0))
+    assert "far" in registers.doable("u0", now_s=10.1)
+
+    registers.say("u0", replace(IDLE, decided_s=10.0, completion_s=10.0, sortie_end_s=50.0))
+    assert "far" not in registers.doable("u0", now_s=10.1)
+
+
 def test_at_the_end_of_a_planned_run_hardly_anything_is_doable() -> None:
     """What is told is open; of most runs nothing is left."""
     left = []
