@@ -93,14 +93,14 @@ class Outbox:
         """Say something on one channel."""
         self._sends.append(OutgoingMessage(message, channel))
 
-    def text(self, severity: int, text: str) -> None:
+    def text(self, severity: int, text: str, *, plain: bool = False) -> None:
         """Say a line to people (STATUSTEXT), cut at 50 characters unless texts are numbered."""
         if self.muted:
             return
         if not self._numbers_texts:
             self.broadcast(mavlink.MAVLink_statustext_message(severity, text.encode()[:_TEXT]))
             return
-        encoded = f"{text}\t".encode()
+        encoded = text.encode() if plain else f"{text}\t".encode()
         for place, start in enumerate(range(0, len(encoded), _TEXT)):
             piece = encoded[start : start + _TEXT]
             self.broadcast(
@@ -145,6 +145,8 @@ class FirmwareEvent(Enum):
     FENCE_RECEIVED = auto()
     FENCE_REFUSED = auto()
     """[reason]"""
+    FENCE_KEPT = auto()
+    """The old one, since it was refused."""
     FENCE_WITHOUT_HOME = auto()
     """It was taken, and keeps the vehicle out of its own home."""
     FENCE_BREACHED = auto()
@@ -190,6 +192,8 @@ class TextTemplate:
     """MAV_SEVERITY."""
     template: str
     """For `str.format`, with the fields of its occasion."""
+    plain: bool = False
+    """It ends without a tab where others end in one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,7 +217,8 @@ class Narrator:
         """Speak of an occasion, with the fields that its text may name."""
         text = self._flavour.texts.get(occasion)
         if text is not None:
-            self._outbox.text(text.severity, text.template.format(**fields))
+            words = text.template.format(**fields)
+            self._outbox.text(text.severity, words, plain=text.plain)
         own = self._flavour.own_commands.get(occasion)
         if own is not None:
             self._outbox.broadcast(

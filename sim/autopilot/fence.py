@@ -97,6 +97,12 @@ def fence_of(items: tuple[StoredMissionItem, ...], origin: Origin) -> UploadedFe
     return UploadedFence(tuple(areas))
 
 
+def has_too_few_corners(item: StoredMissionItem | int) -> bool:
+    """Whether a corner says that its polygon is none."""
+    corner = isinstance(item, StoredMissionItem) and item.command in _POLYGONS
+    return corner and item.params[0] < _LEAST_CORNERS
+
+
 def _place_m(item: StoredMissionItem, origin: Origin) -> Place:
     place_enu_m = enu_from_wgs84(origin, item.lat_e7 / 1e7, item.lon_e7 / 1e7, origin.alt_m)
     return place_enu_m[:2]

@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
 
 _CHECK_S = 0.1
+_STORED_BESIDE = 2
+"""ArduCopter counts so many more than there are corners, of one polygon or two."""
 
 
 class FenceMonitor:
@@ -70,8 +72,10 @@ class FenceMonitor:
 
     def uploaded(self, now_s: float) -> None:
         """Hear that there is another fence."""
-        self._pilot.parameter_server.announce("FENCE_TOTAL", float(len(self._store.items)))
         self._pilot.narrator.tell(FirmwareEvent.FENCE_RECEIVED)
+        items = len(self._store.items)
+        total = items + _STORED_BESIDE if items else 0
+        self._pilot.parameter_server.announce("FENCE_TOTAL", float(total))
         self.breached = False
         self._look(now_s, acts=self._pilot.armed and not self._pilot.flight.on_ground)
         added = self._pilot.flavour.fence_behaviour.inclusions_add
@@ -108,6 +112,9 @@ class FenceMonitor:
             self._tell(now_s)
             if acts:
                 self._act(now_s)
+            elif not self._pilot.armed:
+                for obstacle in self.obstacles:
+                    self._pilot.narrator.tell(FirmwareEvent.NOT_READY, obstacle=obstacle)
 
     def _tell(self, now_s: float) -> None:
         if not self._pilot.flavour.fence_behaviour.tells_status:
@@ -122,15 +129,11 @@ class FenceMonitor:
     def _act(self, now_s: float) -> None:
         pilot = self._pilot
         mode = pilot.flavour.fence_mode(pilot.parameters)
-        first = pilot.flavour.modes.told_at_once
-        if not first:
-            pilot.narrator.tell(FirmwareEvent.FENCE_BREACHED)
+        if mode is pilot.mode:
+            pilot.enter(mode, now_s)  # to stop there
+        elif mode is not None and not pilot.set_mode(mode, now_s):
+            pilot.set_mode(FlightMode.LAND, now_s)
+        pilot.narrator.tell(FirmwareEvent.FENCE_BREACHED)
         if mode is not None:
-            if mode is pilot.mode:
-                pilot.enter(mode, now_s)  # to stop there
-            elif not pilot.set_mode(mode, now_s):
-                pilot.set_mode(FlightMode.LAND, now_s)
             self._acted_in = pilot.mode
             pilot.narrator.tell(FirmwareEvent.FENCE_ACTED)
-        if first:
-            pilot.narrator.tell(FirmwareEvent.FENCE_BREACHED)

@@ -295,12 +295,11 @@ class MissionRun:
             return
         seq = self.current
         following = self._store.item(seq + 1)
-        # Where returning leaves the mission, that is done at once too, and alone is told.
-        if (
-            following is None
-            or following.command != mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH
-            or not self._behaviour.forgets_mode
-        ):
+        # Where returning leaves the mission, that is done at once too, and alone is told; so is
+        # the trigger of another component's camera.
+        returns = mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH if self._behaviour.forgets_mode else None
+        triggers = mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST if self._behaviour.tells_camera else None
+        if following is None or following.command not in (returns, triggers):
             self._reached(seq, at_s)
         if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
             self._pilot.narrator.tell(FirmwareEvent.WAYPOINT_REACHED, seq=seq)

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.events import FirmwareEvent, Sender
-from sim.autopilot.fence import FENCE_COMMANDS, FenceError
+from sim.autopilot.fence import FENCE_COMMANDS, FenceError, has_too_few_corners
 from sim.autopilot.mission_item import (
     INT_FRAMES,
     StoredMissionItem,
@@ -93,12 +93,20 @@ class MissionServer:
             return
         if at_s >= upload.expires_s:
             self._upload = None
-            what = "Fence" if upload.kind == _FENCE else "Mission"
-            self._outbox.text(mavlink.MAV_SEVERITY_WARNING, f"{what} upload timeout")
-            cancelled = mavlink.MAV_MISSION_OPERATION_CANCELLED
-            self._acknowledge(upload.sender, cancelled, upload.kind)
+            self._give_up(upload)
         else:
             self._request_next(upload, at_s)
+
+    def _give_up(self, upload: _Upload) -> None:
+        cancelled = mavlink.MAV_MISSION_OPERATION_CANCELLED
+        if upload.kind == _MISSION:
+            self._outbox.text(mavlink.MAV_SEVERITY_WARNING, "Mission upload timeout")
+            self._acknowledge(upload.sender, cancelled)
+        elif self._behaviour.gives_up_silently:
+            self._outbox.text(mavlink.MAV_SEVERITY_CRITICAL, "Operation timeout")
+        else:
+            self._acknowledge(upload.sender, cancelled, upload.kind)
+            self._outbox.text(mavlink.MAV_SEVERITY_WARNING, "Fence upload timeout")
 
     def forget(self, channel: int) -> None:
         """Give up an upload whose channel is gone."""
@@ -162,6 +170,8 @@ class MissionServer:
             if kind == _FENCE
             else item_from_message(message, gives_way=self._behaviour.gives_way)
         )
+        if self._behaviour.gives_up_silently and has_too_few_corners(item):
+            item = int(mavlink.MAV_MISSION_ERROR)
         if not isinstance(item, StoredMissionItem):
             self._upload = None
             self._acknowledge(sender, item, kind)
@@ -189,6 +199,7 @@ class MissionServer:
         except FenceError as error:
             self._acknowledge(upload.sender, mavlink.MAV_MISSION_ERROR, _FENCE)
             self._pilot.narrator.tell(FirmwareEvent.FENCE_REFUSED, reason=error)
+            self._pilot.narrator.tell(FirmwareEvent.FENCE_KEPT)
             return
         self._acknowledge(upload.sender, mavlink.MAV_MISSION_ACCEPTED, _FENCE)
         self._pilot.fence.uploaded(now_s)

@@ -37,6 +37,10 @@ ENVELOPE = {"t_s", "from", "sys", "comp", "msg"}
 REBOOT_GAP_S = 30.0
 """A silence of the vehicle this long [s] is another power-up."""
 TEXTS = (
+    "Fence",
+    "Invalid vertex",
+    "Manual recovery",
+    "Polygon fence",
     "GCS Failsafe",
     "Battery 1 is",
     "Battery Failsafe",
@@ -134,6 +138,7 @@ REDUCTIONS: dict[str, Reduce] = {
     "MISSION_REQUEST": lambda each: (each["msg"], each["seq"]),
     "MISSION_REQUEST_INT": lambda each: (each["msg"], each["seq"]),
     "MISSION_ITEM_REACHED": lambda each: (each["msg"], each["seq"]),
+    "FENCE_STATUS": lambda each: (each["msg"], each["breach_status"], each["breach_type"]),
     "MISSION_ACK": lambda each: (
         "mission ack",
         each["type"],
@@ -313,11 +318,9 @@ def without_bounce(messages: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
     Where it landed is its home from then on, as after any landing.
     """
-    landings = [
-        place
-        for place, each in enumerate(messages)
-        if each["msg"] == "STATUSTEXT" and each["text"] == "Landing detected\t"
-    ]
+    said = [each["text"] if each["msg"] == "STATUSTEXT" else "" for each in messages]
+    end = said.index("Disarmed by landing\t") if "Disarmed by landing\t" in said else len(said)
+    landings = [place for place, text in enumerate(said[:end]) if text == "Landing detected\t"]
     if len(landings) < 2:
         return messages
     first, last = landings[0], landings[-1]
@@ -363,6 +366,7 @@ PX4_READY = Delays(1.0, 1.0, 1.0, 1.0)
 
 COPTER_BOOTS = Delays(2.5, 15.0, 20.0, 41.4)
 PX4_BOOTS = Delays(2.5, 2.5, 2.5, 2.5)
+TURNS = {"acceleration_m_s2": 2.5, "rounds_corners": True}
 PX4_FLIGHT = {"spool_up_s": 1.5, "climb_m_s": 1.2, "land_m_s": 1.4, "cruise_m_s": 5.0}
 
 PLAYS = {
@@ -400,6 +404,34 @@ PLAYS = {
     ),
     "ArduCopter's flight": Play(
         "arducopter-4.8-flight.jsonl", 4.0, ArduCopterModel(), COPTER_BOOTS, 488.1, ARDUCOPTER
+    ),
+    "ArduCopter's landings": Play(
+        "arducopter-4.8-landing.jsonl", 4.0, ArduCopterModel(), COPTER_BOOTS, 488.1, ARDUCOPTER
+    ),
+    "PX4's landings": Play("px4-1.17-landing.jsonl", 3.0, Px4Model(), PX4_BOOTS, 487.8, PX4_FLIGHT),
+    "ArduCopter's fence": Play(
+        "arducopter-4.8-fence.jsonl",
+        4.0,
+        ArduCopterModel(),
+        COPTER_BOOTS,
+        488.1,
+        {**ARDUCOPTER, "land_m_s": 0.35},
+    ),
+    "PX4's fence": Play("px4-1.17-fence.jsonl", 3.0, Px4Model(), PX4_BOOTS, 487.8, PX4_FLIGHT),
+    "ArduCopter's camera": Play(
+        "arducopter-4.8-camera.jsonl", 4.0, ArduCopterModel(), COPTER_BOOTS, 488.1, ARDUCOPTER
+    ),
+    "PX4's camera": Play("px4-1.17-camera.jsonl", 3.0, Px4Model(), PX4_BOOTS, 487.8, PX4_FLIGHT),
+    "ArduCopter's corners": Play(
+        "arducopter-4.8-corners.jsonl",
+        4.0,
+        ArduCopterModel(),
+        COPTER_BOOTS,
+        488.1,
+        {**ARDUCOPTER, **TURNS},
+    ),
+    "PX4's corners": Play(
+        "px4-1.17-corners.jsonl", 3.0, Px4Model(), PX4_BOOTS, 487.8, {**PX4_FLIGHT, **TURNS}
     ),
     "ArduCopter without its ground station": Play(
         "arducopter-4.8-ground-lost.jsonl", 4.0, ArduCopterModel(), COPTER_BOOTS, 488.1, ARDUCOPTER

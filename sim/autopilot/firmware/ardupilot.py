@@ -99,6 +99,7 @@ _TEXTS = {
         FirmwareEvent.DISARMED_UNUSED: "Disarming motors",
         FirmwareEvent.DISARMED_LANDED: "Disarming motors",
         FirmwareEvent.MISSION_RECEIVED: "Flight plan received",
+        FirmwareEvent.FENCE_ACTED: "Manual recovery started",
         FirmwareEvent.ITEM_BEGUN: "Mission: {seq} {name}",
         FirmwareEvent.WAYPOINT_REACHED: "Reached command #{seq}",
     },
@@ -108,8 +109,9 @@ _TEXTS = {
         FirmwareEvent.FENCE_CLEARED: "Fence breach cleared",
     },
     _WARNING: {
-        FirmwareEvent.NO_SUCH_MODE: "No such mode {number}",
         FirmwareEvent.FENCE_REFUSED: "{reason}",
+        FirmwareEvent.FENCE_KEPT: "Fence validation failed",
+        FirmwareEvent.NO_SUCH_MODE: "No such mode {number}",
         FirmwareEvent.MODE_REFUSED: "Mode change to {mode} failed: {reason}",
     },
     _CRITICAL: {
@@ -236,6 +238,7 @@ class ArduCopterModel(FirmwareModel):
             ),
             ParameterEntry("WP_ACC", 2.5, _REAL, least=0.5),
             ParameterEntry("WP_JERK", 1.0, _REAL, least=1.0),
+            ParameterEntry("WP_ACC_CNR", 0.0, _REAL, least=0.0),
             ParameterEntry("WP_RADIUS_M", 2.0, _REAL, ParameterRole.CORNER_RADIUS_M, least=0.05),
             ParameterEntry(
                 "LAND_SPD_MS", config.land_m_s, _REAL, ParameterRole.LAND_M_S, least=0.1
@@ -255,7 +258,11 @@ class ArduCopterModel(FirmwareModel):
             ParameterEntry("FENCE_TYPE", 7.0, _INT8),
             ParameterEntry("FENCE_RADIUS", 300.0, _REAL, least=30.0),
             ParameterEntry("FENCE_ACTION", 1.0, _INT8, least=0.0),
+            ParameterEntry("FENCE_MARGIN", 2.0, _REAL, least=0.0),
+            ParameterEntry("FENCE_OPTIONS", 0.0, _INT16, least=0.0),
             ParameterEntry("FENCE_TOTAL", 0.0, _INT8, read_only=True),
+            ParameterEntry("CAM1_TYPE", 0.0, _INT8, least=0.0),
+            ParameterEntry("CAM_AUTO_ONLY", 0.0, _INT8, least=0.0),
             ParameterEntry("AUTO_OPTIONS", 0.0, _INT32),
             ParameterEntry("MIS_TOTAL", 0.0, _INT16, read_only=True),
             ParameterEntry("MIS_RESTART", 0.0, _INT8),

@@ -78,6 +78,9 @@ class MissionBehaviour:
     """Whether items are asked for by MISSION_REQUEST_INT."""
     int_frames: bool = False
     """Whether items are given back in the ``_INT`` variant of their frame."""
+    gives_up_silently: bool = False
+    """Whether the upload of a fence that is cut off ends without an acknowledgement, and one of
+    too few corners at the first of them."""
     marks_current: bool = False
     """Whether the current item says so when it is given back."""
     first_item: int = 0

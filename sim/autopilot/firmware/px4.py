@@ -109,7 +109,6 @@ _TEXTS = {
         FirmwareEvent.NO_SUCH_MODE: "Unsupported auto mode",
         FirmwareEvent.MODE_REFUSED: "Switching to mode '{mode}' is currently not available",
         FirmwareEvent.FENCE_WITHOUT_HOME: "Geofence invalid, doesn't contain Home position",
-        FirmwareEvent.FENCE_BREACHED: "Geofence: approaching or outside geofence",
         FirmwareEvent.FENCE_ACTED: "Failsafe activated",
         FirmwareEvent.TARGET_OUTSIDE_FENCE: "Reposition is outside geofence",
         FirmwareEvent.MISSION_UNAVAILABLE: "No valid mission available, loitering",
@@ -158,6 +157,7 @@ class Px4Model(FirmwareModel):
     missions = MissionBehaviour(
         asks_for_int=True,
         int_frames=True,
+        gives_up_silently=True,
         marks_current=True,
         check_s=1.9,
         upload_rewinds=True,
@@ -229,7 +229,14 @@ class Px4Model(FirmwareModel):
     fixed_streams = frozenset({mavlink.MAVLINK_MSG_ID_MISSION_CURRENT})
     missing_messages = frozenset({mavlink.MAVLINK_MSG_ID_EKF_STATUS_REPORT})
 
-    texts = texts_of(_TEXTS)
+    texts = MappingProxyType(
+        {
+            **texts_of(_TEXTS),
+            FirmwareEvent.FENCE_BREACHED: TextTemplate(
+                _CRITICAL, "Geofence: approaching or outside geofence", plain=True
+            ),
+        }
+    )
     own_commands = MappingProxyType(
         {
             FirmwareEvent.MISSION_OVER: OwnCommand(
@@ -259,6 +266,9 @@ class Px4Model(FirmwareModel):
             ParameterEntry("COM_RC_LOSS_T", 3.0, _REAL, least=0.0),
             ParameterEntry("GF_ACTION", 2.0, _INT32, least=0.0),
             ParameterEntry("GF_MAX_HOR_DIST", 0.0, _REAL, least=0.0),
+            ParameterEntry("GF_MAX_VER_DIST", 0.0, _REAL, least=0.0),
+            ParameterEntry("GF_PREDICT", 0.0, _INT32, least=0.0),
+            ParameterEntry("GF_SOURCE", 0.0, _INT32, least=0.0),
             ParameterEntry("MAV_SYS_ID", float(config.system_id), _INT32, read_only=True),
             ParameterEntry("MAV_TYPE", float(mavlink.MAV_TYPE_QUADROTOR), _INT32, read_only=True),
             ParameterEntry(
@@ -275,6 +285,8 @@ class Px4Model(FirmwareModel):
             ParameterEntry(
                 "MPC_XY_CRUISE", config.cruise_m_s, _REAL, ParameterRole.CRUISE_M_S, least=0.1
             ),
+            ParameterEntry("MPC_XY_ERR_MAX", 2.0, _REAL, least=0.1),
+            ParameterEntry("MPC_XY_TRAJ_P", 0.5, _REAL, least=0.1),
             ParameterEntry("MPC_XY_VEL_MAX", max(12.0, config.cruise_m_s), _REAL, least=0.0),
             ParameterEntry("MPC_Z_V_AUTO_UP", 3.0, _REAL, ParameterRole.CLIMB_M_S, least=0.1),
             ParameterEntry("NAV_ACC_RAD", 2.0, _REAL, ParameterRole.CORNER_RADIUS_M, least=0.05),

@@ -6,6 +6,10 @@ texts when it finds time, so what it says is compared in the order of each kind.
 
 from __future__ import annotations
 
+import itertools
+import math
+from typing import Any
+
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
@@ -74,6 +78,91 @@ def test_px4_goes_through_the_recorded_states(name: str) -> None:
 
     for message, fields in STATES.items():
         assert states(simulated, message, *fields) == states(real, message, *fields)
+
+
+METRES_PER_E7 = 1.11195e-2
+"""Of latitude."""
+FIELD = ["landings", "fence", "camera", "corners"]
+
+
+@pytest.mark.parametrize("what", FIELD)
+def test_arducopter_in_the_field_says_what_the_recorded_one_said_in_one_order(what: str) -> None:
+    real, simulated, asked = played(PLAYS[f"ArduCopter's {what}"])
+
+    # What is asked for while it boots is answered sooner or later.
+    rate = "ack", mavlink.MAV_CMD_SET_MESSAGE_INTERVAL
+    said, recorded = (
+        [each for each in what_matters(messages, asked) if each[1][:2] != rate]
+        for messages in (simulated, real)
+    )
+    assert said == recorded
+
+
+@pytest.mark.parametrize("what", FIELD)
+def test_px4_in_the_field_says_what_the_recorded_one_said_in_the_order_of_each_kind(
+    what: str,
+) -> None:
+    real, simulated, asked = played(PLAYS[f"PX4's {what}"])
+
+    conversation = {"COMMAND_ACK", "MISSION_REQUEST_INT", "MISSION_ACK"}
+    for kind in [conversation, *({kind} for kind in sorted(REDUCTIONS.keys() - conversation))]:
+        said, recorded = (
+            # How often it repeats itself depends on how long everything takes.
+            [
+                key
+                for key, _ in itertools.groupby(
+                    key for message, key in what_matters(messages, asked) if message in kind
+                )
+            ]
+            for messages in (simulated, real)
+        )
+        assert said == recorded
+
+
+@pytest.mark.parametrize("what", FIELD)
+@pytest.mark.parametrize("whose", ["ArduCopter", "PX4"])
+def test_vehicles_in_the_field_go_through_recorded_states(whose: str, what: str) -> None:
+    real, simulated, _ = played(PLAYS[f"{whose}'s {what}"])
+
+    landed = states(real, "EXTENDED_SYS_STATE", "landed_state")
+    assert states(simulated, "EXTENDED_SYS_STATE", "landed_state") == landed
+    fields = ("HEARTBEAT", *STATES["HEARTBEAT"])
+    assert set(states(simulated, *fields)) <= set(states(real, *fields))
+
+
+@pytest.mark.parametrize("whose", ["ArduCopter", "PX4"])
+def test_missions_pass_corners_as_near_as_the_recorded_ones(whose: str) -> None:
+    play = PLAYS[f"{whose}'s corners"]
+    items = [each for each in play.messages() if each["msg"] == "MISSION_ITEM_INT" and each["z"]]
+    corners = [(each["x"], each["y"]) for each in items]
+    assert len(corners) == 4
+    near_m = [
+        [closest_m(before_targets(messages), corner) for corner in corners]
+        for messages in played(play)[:2]
+    ]
+
+    for real_m, simulated_m in zip(*near_m, strict=True):
+        assert abs(real_m - simulated_m) < 0.9
+        assert max(real_m, simulated_m) < 2.0
+
+
+def before_targets(messages: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """What was said before the vehicle was told to fly to targets."""
+    command = mavlink.MAV_CMD_DO_REPOSITION
+    told = next(place for place, each in enumerate(messages) if each.get("command") == command)
+    return messages[:told]
+
+
+def closest_m(messages: list[dict[str, Any]], corner: tuple[int, int]) -> float:
+    """How near the vehicle came to a place of an item [m]."""
+    east_m_per_e7 = 1.11195e-2 * math.cos(math.radians(corner[0] / 1e7))
+    return min(
+        math.hypot(
+            (each["lat"] - corner[0]) * 1.11195e-2, (each["lon"] - corner[1]) * east_m_per_e7
+        )
+        for each in messages
+        if each["msg"] == "GLOBAL_POSITION_INT"
+    )
 
 
 def test_everything_in_the_recordings_is_compared() -> None:
