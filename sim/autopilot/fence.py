@@ -99,8 +99,9 @@ def fence_of(items: tuple[StoredMissionItem, ...], origin: Origin) -> UploadedFe
 
 def has_too_few_corners(item: StoredMissionItem | int) -> bool:
     """Whether a corner says that its polygon is none."""
-    corner = isinstance(item, StoredMissionItem) and item.command in _POLYGONS
-    return corner and item.params[0] < _LEAST_CORNERS
+    if not isinstance(item, StoredMissionItem) or item.command not in _POLYGONS:
+        return False
+    return item.params[0] < _LEAST_CORNERS
 
 
 def _place_m(item: StoredMissionItem, origin: Origin) -> Place:
