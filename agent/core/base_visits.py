@@ -44,12 +44,16 @@ class BaseVisit:
     """Since when everybody has known when it is going to arrive."""
     punctual: bool = False
     """Whether it has arrived then."""
+    late_at_s: float | None = None
+    """When it will have waited for longer than it said."""
+    late: bool = False
+    """Whether it has."""
     hopeless_at_s: float | None = None
     """When it has stood beside slots for long enough that are all blocked."""
 
     def next_deadline_s(self) -> float | None:
         """When any of that is due."""
-        return earliest(self.held_at_s, self.waited_at_s, self.hopeless_at_s)
+        return earliest(self.held_at_s, self.waited_at_s, self.late_at_s, self.hopeless_at_s)
 
 
 class BaseVisits(AgentPart):
@@ -114,6 +118,11 @@ class BaseVisits(AgentPart):
         """Whether lost UAVs stand on all slots of a base, so that to wait there is in vain."""
         standing = sum(where == base.id for where in self.blocking().values())
         return base.slots is not None and standing >= base.slots
+
+    @property
+    def waits_long(self) -> bool:
+        """Whether it has waited above its base for longer than it said it would."""
+        return self._visit.late and self._visit.waited
 
     def situated(self, claim: Claim) -> Claim:
         """``claim`` with the base at which the vehicle stands, and until when it can fly."""
@@ -221,6 +230,8 @@ class BaseVisits(AgentPart):
                 self._say(replace(claim, arrives_s=mission_s))
         else:
             self._visit.waited_at_s = now_s + self._timing.objection_window_s
+        begins_s = claim.completion_s - base.swap_s + self._timing.patience_s
+        self._visit.late_at_s = now_s + begins_s - self._mission_view.mission_s(now_s)
         self._land_or_wait(base, now_s)
 
     def advance(self, now_s: float) -> None:
@@ -233,6 +244,8 @@ class BaseVisits(AgentPart):
             self._say(replace(claim, phase=ClaimPhase.HELD))
         if visit.waited_at_s is not None and visit.waited_at_s <= now_s:
             visit.waited_at_s, visit.waited = None, True
+        if visit.late_at_s is not None and visit.late_at_s <= now_s:
+            visit.late_at_s, visit.late = None, True
         base = self._base()
         if self._machine.state is AgentState.SWAPPING:
             self._let_start_if_told()

@@ -21,6 +21,7 @@ from agent.core.field_decision import (
     divert_in_field,
 )
 from agent.core.flights import HomeFlight
+from agent.core.havens import Haven, Havens
 from agent.core.states import (
     AT_BASE,
     PAUSED_BY_OPERATOR,
@@ -48,6 +49,9 @@ class FieldTasking(Tasking):
         self._visits = BaseVisits(context, self._flights, self._sortie, self._visit_over)
         self._limits = TimeLimits(context, self._flights, self._sortie)
         self._refused_bases = RefusedTasks(context.timing.reconsider_s)
+        self._havens = Havens(
+            context, self._flights, self._sortie, self._visits, self._refused_bases
+        )
         self._departed_from: str | None = None
         """The base that it has just been sent off from, until it has arrived anywhere."""
         self._drained = False
@@ -164,6 +168,9 @@ class FieldTasking(Tasking):
         """What follows from constraints and the time, in a running mission, before `advance`."""
         if self._in_field:
             self._visits.advance(now_s)
+            if (haven := self._havens.instead_of_waiting(now_s)) is not None:
+                self._visits.break_off("another base is ready earlier", now_s)
+                self._visit_base(haven, now_s)
             self._depart_if_due(now_s)
             self._begin_if_due(now_s)
             self._give_up_what_is_late(now_s)
@@ -193,7 +200,12 @@ class FieldTasking(Tasking):
         elif decision.task is not None:
             self._take_task(problem, epoch, turn, decision, now_s)
         elif decision.base is not None:
-            self._take_base(problem, epoch, decision, now_s)
+            haven = self._havens.reach(decision.base, now_s)
+            if haven is None:
+                self._stay_idle(now_s)
+            else:
+                told_s = {"arrives_s": decision.arrive_s, "ready_s": decision.end_s}
+                self._visit_base(replace(haven, **told_s), now_s)
 
     def _divert_in_field(self, now_s: float) -> None:
         problem, epoch, claim = self._flights.problem, self._replica.epoch, self.claim
@@ -272,26 +284,16 @@ class FieldTasking(Tasking):
         self._note("decided", task.task, **scores, completion_s=decision.end_s)
         self._actions.append(told)
 
-    def _take_base(
-        self, problem: FieldProblem, epoch: PlanEpoch, decision: FieldTurnDecision, now_s: float
-    ) -> None:
-        base = str(decision.base)
-        way = self._flights.way_to_base(base)
-        if way is None:
-            self._stay_idle(now_s)
-            return
-        rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
-        times_s = decision.arrive_s, decision.end_s
-        self._visit_base(way, base, rank, *times_s, now_s)
-
-    def _visit_base(
-        self, way: Way, base: str, rank: int, arrives_s: float, ready_s: float, now_s: float
-    ) -> None:
-        since_s = self._free.since_s
+    def _visit_base(self, haven: Haven, now_s: float) -> None:
+        """Fly there and claim a slot; being free, or having just become it."""
+        problem, epoch, since_s = self._flights.problem, self._replica.epoch, self._free.since_s
+        sequence = () if epoch is None else epoch.sequence
+        rank = 0 if problem is None else ranks(sequence, problem.uav_ids)[self._uav]
         self._leave_ground(now_s)
         self._become_free(since_s)
         self._free.to_decide = False
-        self._visits.set_off(way, base, since_s, rank, arrives_s, ready_s, now_s)
+        times_s = haven.arrives_s, haven.ready_s
+        self._visits.set_off(haven.way, haven.base.id, since_s, rank, *times_s, now_s)
 
     def _visit_over(self, since_s: float, adrift: bool) -> None:
         self._become_free(since_s, adrift=adrift)
@@ -418,7 +420,7 @@ class FieldTasking(Tasking):
         self._home_at_s = None
         if state in (AgentState.FLYING_TO_BASE, AgentState.ABOVE_BASE):
             self._visits.reroute(now_s)
-        elif state is AgentState.FLYING and task is not None:
+        elif state in (AgentState.FLYING, AgentState.DEPARTING) and task is not None:
             self._reroute_to(task, claim, now_s)
         elif state is AgentState.SERVING and task is not None:
             line_s = self._flights.line_s(task.task, backwards=bool(claim.reversed))
@@ -430,17 +432,15 @@ class FieldTasking(Tasking):
     def _reroute_to(self, task: TaskEntry, claim: Claim, now_s: float) -> None:
         way = self._flights.way_to_task(task.task, backwards=bool(claim.reversed))
         mission_s = self._mission_view.mission_s(now_s)
-        if way is None:
-            self._release("zones leave no way", now_s)
-            return
-        begins_s = max(mission_s + way.duration_s, task.opens_s)
-        line_s = self._flights.line_s(task.task, backwards=bool(claim.reversed))
-        if not begins_s <= self._limits.latest_begin_s(task, claim) + TOLERANCE_S:
-            self._release("zones make the way too long", now_s)
-            return
-        self._attempt.too_late_at_s = self._limits.too_late_at_s(task, claim, now_s)
-        self._fly(way, task, claim)
-        self._say(replace(claim, completion_s=begins_s + line_s + task.service_s))
+        waits = self._machine.state is AgentState.DEPARTING
+        upset = self._limits.upset(task, claim, way, None if waits else mission_s)
+        if way is None or upset is not None:
+            self._release(upset or "zones leave no way", now_s)
+        elif not waits:
+            ends_s = self._limits.ends_s(task, claim, mission_s + way.duration_s)
+            self._attempt.too_late_at_s = self._limits.too_late_at_s(task, claim, now_s)
+            self._fly(way, task, claim)
+            self._say(replace(claim, completion_s=ends_s))
 
     # -- without a task ------------------------------------------------------------------------
 
@@ -462,26 +462,26 @@ class FieldTasking(Tasking):
         """Who has found nothing to do flies to the nearest base before its battery is used up."""
         if not self._in_field:
             return
-        self._home_at_s = self._limits.leaves_at_s(self.stands_at is not None, now_s)
+        self._home_at_s = self._leaves_at_s(now_s)
         if self._home_at_s is None or self._home_at_s > now_s:
             return
         if self._machine.state is AgentState.ABOVE_BASE:
             self._home_at_s = None
             self._visits.come_down(now_s)
             return
-        home, epoch, problem = self._flights.way_home(), self._replica.epoch, self._flights.problem
+        home = self._havens.home(now_s)
         if self._machine.state is not AgentState.IDLE or home is None or home.base is None:
             return
-        base, way = self._flights.base(home.base), self._flights.way_to_base(home.base)
-        if base is None or way is None or epoch is None or problem is None:
-            return
-        refused = home.base in self._refused_bases.left_alone(now_s)
-        if not (refused or self._visits.is_blocked(base)):
-            arrives_s = self._mission_view.mission_s(now_s) + way.duration_s
-            rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
-            ready_s = arrives_s + base.swap_s
-            self._visit_base(way, home.base, rank, arrives_s, ready_s, now_s)
-            self._home_at_s = self._limits.leaves_at_s(self.stands_at is not None, now_s)
+        haven = self._havens.reach(home.base, now_s)
+        if haven is not None and self._havens.is_usable(haven.base, now_s):
+            self._visit_base(haven, now_s)
+            self._home_at_s = self._leaves_at_s(now_s)
+
+    def _leaves_at_s(self, now_s: float) -> float | None:
+        """When it has to head home from where it is, on the own clock; None: never."""
+        stands = self.stands_at is not None
+        seeks = self._machine.state in WITHOUT_AIM and not stands
+        return self._limits.leaves_at_s(self._havens.home(now_s) if seeks else None, stands, now_s)
 
     def spent(self, now_s: float) -> str | None:
         """Why the UAV has to fly home for good: its battery; None if it need not."""
@@ -490,7 +490,7 @@ class FieldTasking(Tasking):
         if self._visits.is_hopeless(now_s):
             return "its battery is used up, and the slots of its base are blocked"
         if self._machine.state in PAUSED_BY_OPERATOR:  # nothing else looks at the time there
-            self._home_at_s = self._limits.leaves_at_s(self.stands_at is not None, now_s)
+            self._home_at_s = self._leaves_at_s(now_s)
         if self._home_at_s is None or self._home_at_s > now_s:
             return None
         return "its battery is about to be used up"

@@ -11,8 +11,9 @@ from typing import Final
 
 from agent.core.context import AgentContext, AgentPart
 from agent.core.energy import TOLERANCE_S, SortieClock
-from agent.core.flights import Flights
+from agent.core.flights import Flights, HomeFlight
 from agent.core.states import PAUSED_BY_OPERATOR, AgentState
+from swarm.allocation.field.ways import Way
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import TaskEntry
 from swarm.protocol.uav_messages import Claim
@@ -58,13 +59,43 @@ class TimeLimits(AgentPart):
         latest_s = self.latest_begin_s(task, claim) - self._mission_view.mission_s(now_s)
         return None if math.isinf(latest_s) else now_s + latest_s + 2.0 * TOLERANCE_S
 
+    def ends_s(self, task: TaskEntry, claim: Claim, arrives_s: float) -> float:
+        """Mission time at which the task is done by who is there then [s]."""
+        line_s = self._flights.line_s(task.task, backwards=bool(claim.reversed))
+        return max(arrives_s, task.opens_s) + line_s + task.service_s
+
+    def upset(
+        self, task: TaskEntry, claim: Claim, way: Way | None, mission_s: float | None
+    ) -> str | None:
+        """Why what is claimed is not to be done as it was claimed, now that zones have changed.
+
+        Args:
+            task: it.
+            claim: of it.
+            way: the way there now; None: there is none.
+            mission_s: now, in the air; None: it stands at a base until it is to take off.
+        """
+        if way is None:
+            return "zones leave no way"
+        if mission_s is not None:
+            begins_s = max(mission_s + way.duration_s, task.opens_s)
+            in_time = begins_s <= self.latest_begin_s(task, claim) + TOLERANCE_S
+            return None if in_time else "zones make the way too long"
+        # On the ground it may as well depart at another time, or do something else.
+        ends_s = self.ends_s(task, claim, (claim.departs_s or 0.0) + way.duration_s)
+        if abs(ends_s - claim.completion_s) > TOLERANCE_S:
+            return "zones make the way another one"
+        end_s = math.inf if claim.sortie_end_s is None else claim.sortie_end_s
+        lasts = ends_s + self._home_s(task, claim) <= end_s + TOLERANCE_S
+        return None if lasts else "zones make the way home too long"
+
     def lasts(self, task: TaskEntry, claim: Claim) -> bool:
         """Whether the battery lasts until the UAV is home from what it claims."""
         home_at_s = claim.completion_s + self._home_s(task, claim)
         return home_at_s <= self._sortie.end_s + TOLERANCE_S
 
-    def leaves_at_s(self, stands: bool, now_s: float) -> float | None:
-        """When the UAV has to head home from where it is, on the own clock; None: never.
+    def leaves_at_s(self, home: HomeFlight | None, stands: bool, now_s: float) -> float | None:
+        """When the UAV has to head ``home`` from where it is, on the own clock; None: never.
 
         Only who stands by nothing in the air has to: other ways home are reckoned with already.
         Above a base it has nowhere to go, and lands when its sortie ends, beside the slots if need
@@ -78,7 +109,6 @@ class TimeLimits(AgentPart):
             return end_at_s
         if state not in WITHOUT_AIM:
             return None
-        home = self._flights.way_home()
         return None if home is None else end_at_s - home.duration_s - self._timing.patience_s
 
     def _home_s(self, task: TaskEntry, claim: Claim) -> float:

@@ -8,6 +8,7 @@ itself, and passes in.
 
 from __future__ import annotations
 
+import heapq
 import math
 from collections.abc import Collection, Mapping
 
@@ -113,6 +114,49 @@ def may_land(
         return True
     waiting = {other for other in earlier if flying[other].stage is BaseStage.WAITING}
     return waited and len(holding | waiting | taken) < slots
+
+
+def lands_s(
+    base: str,
+    free: int,
+    swap_s: float,
+    claims: Mapping[str, Claim],
+    arrives_s: float,
+    now_s: float,
+) -> float:
+    """When somebody who arrives at ``base`` then finds a slot [s]; infinite where there is none.
+
+    Whoever is there, or said that it arrives no later, lands first, each as soon as it can.
+
+    Args:
+        base: where.
+        free: slots on which nobody stands who is lost.
+        swap_s: how long a swap takes there [s].
+        claims: those of credible others.
+        arrives_s: when it is above the base [s mission time].
+        now_s: nobody leaves a slot before [s mission time].
+    """
+    if free <= 0:
+        return math.inf
+    here = [(uav, claim) for uav, claim in claims.items() if claim.base == base]
+    left_s = [
+        max(now_s, claim.completion_s if claim.departs_s is None else claim.departs_s)
+        for _, claim in here
+        if holds_slot(claim)
+    ]
+    slots_s = sorted(left_s)[-free:] + [now_s] * (free - len(left_s))
+    heapq.heapify(slots_s)
+    queue = sorted(arrival_order(uav, claim) for uav, claim in here if _queues(claim))
+    for comes_s, _, _ in queue:
+        if comes_s <= arrives_s:
+            heapq.heapreplace(slots_s, max(slots_s[0], comes_s) + swap_s)
+    return max(slots_s[0], arrives_s)
+
+
+def _queues(claim: Claim) -> bool:
+    """Whether who claims so is going to take a slot, and has none yet."""
+    in_the_air = claim.stage in (BaseStage.APPROACHING, BaseStage.WAITING)
+    return in_the_air or wants_slot(claim)
 
 
 def _lets_pass(flying: Claim, parked: Claim, swap_s: float) -> bool:

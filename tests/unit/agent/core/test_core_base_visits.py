@@ -13,6 +13,7 @@ from swarm.protocol.messages import CommandKind, MissionPhase
 from swarm.protocol.uav_messages import BaseStage, ClaimPhase, StatusPhase
 from tests.support.builders import entry, epoch
 from tests.support.field_agent import (
+    BASE,
     BUDGET_S,
     FAR_BASE,
     SWAP_S,
@@ -136,6 +137,55 @@ def test_it_holds_its_slot_until_it_has_to_depart(script: Script) -> None:
     assert claim.sortie_end_s == 150.0 + BUDGET_S
 
 
+def departing(script: Script) -> FieldAgent:
+    """It stands at the base until it is to take off for a task that opens at 200 s."""
+    agent = FieldAgent()
+    agent.fly_to(entry("t0", 100.0, opens_s=200.0))
+    script.items = ["base:b0", "t0"]
+    agent.start_mission()
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.touch_down(50.0)
+    agent.get_full(70.0)
+    assert agent.state() is AgentState.DEPARTING
+    return agent
+
+
+def test_a_zone_on_the_way_makes_who_waits_on_the_ground_decide_anew(script: Script) -> None:
+    agent = departing(script)
+    script.items = ["t0"]
+
+    agent.drawn(square("z", 75.0, 0.0, 10.0), 80.0)
+
+    assert agent.state() is AgentState.DEPARTING
+    assert agent.claim is not None
+    assert agent.claim.task == "t0"
+    assert agent.claim.departs_s is not None
+    assert agent.claim.departs_s < 150.0 - 1.0
+
+
+def test_a_zone_over_its_task_leaves_who_waits_on_the_ground_there(script: Script) -> None:
+    agent = departing(script)
+
+    agent.drawn(square("z", 100.0, 0.0), 80.0)
+
+    assert agent.state() is AgentState.READY_ON_GROUND
+    assert agent.claim is not None
+    assert (agent.claim.task, agent.stage) == (None, BaseStage.PARKED)
+    agent.run_until(160.0)
+    assert agent.state() is AgentState.READY_ON_GROUND
+
+
+def test_a_zone_elsewhere_changes_nothing_for_who_waits_on_the_ground(script: Script) -> None:
+    agent = departing(script)
+    turns = len(script.turns)
+
+    agent.drawn(square("z", 300.0, 300.0), 80.0)
+
+    assert agent.state() is AgentState.DEPARTING
+    assert len(script.turns) == turns
+
+
 def test_a_task_lost_before_take_off_leaves_it_on_the_ground(script: Script) -> None:
     agent = FieldAgent()
     agent.fly_to(entry("t0", 100.0, opens_s=200.0))
@@ -215,6 +265,58 @@ def test_a_base_with_a_dead_slot_holder_is_left_until_the_operator_says_it_is_re
     agent.run_until(70.9)
     agent.arrive(71.0)
     assert agent.state() is AgentState.SWAPPING
+
+
+NEAR_BASE = replace(FAR_BASE, id="b1", position_enu_m=(50.0, 30.0, 0.0), slots=1)
+
+
+def test_who_waits_longer_than_it_said_turns_to_a_base_that_is_ready_earlier(
+    script: Script,
+) -> None:
+    agent = on_its_way(script, "u1", bases=[BASE, NEAR_BASE])
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.run_until(50.0 + 0.9 * agent.timing.patience_s)
+    assert agent.state() is AgentState.ABOVE_BASE
+
+    agent.run_until(50.0 + 1.5 * agent.timing.patience_s)
+
+    assert agent.state() is AgentState.FLYING_TO_BASE
+    assert agent.flight.position_enu_m == (50.0, 30.0, 10.0)
+    assert agent.claim is not None
+    assert (agent.claim.base, agent.stage) == ("b1", BaseStage.APPROACHING)
+
+
+@pytest.mark.parametrize("ready_s", [95.0, 75.0])
+def test_it_waits_on_where_another_base_is_ready_no_earlier(script: Script, ready_s: float) -> None:
+    """Of the other base the time to fly there counts, and who is ahead there."""
+    agent = on_its_way(script, "u1", "u2", bases=[BASE, NEAR_BASE])
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0, ready_s=ready_s))
+    agent.hear("u2", visiting(BaseStage.LANDED, 5.0, base="b1", ready_s=100.0))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.run_until(70.0)
+
+    assert (agent.state(), agent.stage) == (AgentState.ABOVE_BASE, BaseStage.WAITING)
+
+
+def test_with_nothing_to_do_it_flies_to_another_base_where_the_nearest_is_blocked(
+    script: Script,
+) -> None:
+    agent = FieldAgent("u1", bases=[BASE, NEAR_BASE])
+    agent.fly_to(entry("t0", 100.0))
+    agent.be_at((60.0, 0.0, 10.0), None)
+    agent.start_mission()
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.lose("u1", 20.0)
+    agent.run_until(BUDGET_S - 20.0)
+
+    assert agent.state() is AgentState.FLYING_TO_BASE
+    assert agent.claim is not None
+    assert agent.claim.base == "b1"
+    assert agent.claim.arrives_s is not None
+    assert agent.claim.arrives_s <= BUDGET_S
 
 
 def test_who_was_lost_on_its_way_blocks_nothing(script: Script) -> None:
