@@ -8,13 +8,16 @@ where there is less, less far. Lines are flown as they are.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from swarm.allocation.legs import Airspace, PathPlanner
 from swarm.model import Zone
 from swarm.protocol.fields import Point
+
+if TYPE_CHECKING:
+    from swarm.allocation.legs import PathPlanner
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -38,6 +41,8 @@ class PathClearance:
     """
 
     def __init__(self, zones: Sequence[Zone], margin_m: float, clearance_m: float) -> None:
+        from swarm.allocation.legs import Airspace  # plain missions start sooner without
+
         self._true = Airspace(zones, margin_m)
         self._wider = [
             (share * clearance_m, Airspace(zones, margin_m + share * clearance_m))

@@ -10,13 +10,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from itertools import pairwise
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from swarm.allocation.legs.obstacles import Obstacles
 from swarm.model import Zone
 from swarm.protocol.fields import Point
+
+if TYPE_CHECKING:
+    from swarm.allocation.legs.obstacles import Obstacles
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -39,6 +42,8 @@ class ZoneGuard:
     """
 
     def __init__(self, zones: Sequence[Zone] = (), margin_m: float = 0.0) -> None:
+        if zones:  # plain missions start sooner without
+            from swarm.allocation.legs.obstacles import Obstacles
         near_m = max(0.0, margin_m - _ASIDE_M)
         self._zones = [(zone, Obstacles([zone], near_m)) for zone in zones]
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from coordinator.mission_view.wording import listed
 from coordinator.operator.commands import RequestHandler, RequestResult, RequestVerdict
-from swarm.allocation.legs.obstacles import Obstacles
 from swarm.model import Mission, Origin
 from swarm.model.frames import enu_from_wgs84
 from swarm.model.ids import ID_RULE, OPERATOR, valid_id
@@ -222,6 +221,8 @@ def _kept_from(spec: ZoneSpec, mission: Mission) -> list[str]:
     if not named:
         return []
     places_m = np.array([point[:2] for _, point in named], dtype=np.float64)
+    from swarm.allocation.legs.obstacles import Obstacles  # only for zones: it starts slowly
+
     free = Obstacles([spec.zone()], mission.zone_margin_m).free(places_m)
     kept = [name for (name, _), may in zip(named, free.tolist(), strict=True) if not may]
     return list(dict.fromkeys(kept))

@@ -13,12 +13,6 @@ import numpy as np
 
 from coordinator.planner.bound import upper_bound
 from coordinator.planner.exact import Optimum, estimated_s, optimum_before
-from coordinator.planner.field_plan import (
-    FieldRequest,
-    is_field,
-    make_field_plan,
-)
-from coordinator.planner.field_schedule import with_straight_schedule
 from coordinator.planner.options import (
     Limit,
     ShouldStop,
@@ -40,6 +34,7 @@ from swarm.allocation.rules import GuidedRule, team_arrays
 from swarm.kernels.lower_level import EXACT_TASKS
 from swarm.kernels.routes import TeamArrays, optimise_routes
 from swarm.model import Mission, Plan, TaskId, UavId
+from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
@@ -202,7 +197,10 @@ def make_plan(
     """
     if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
-    if is_field(mission):
+    if not PLAIN_CONSTRAINTS.issuperset(mission.constraints):
+        # Only here: all that the field needs would let plans of plain missions begin later.
+        from coordinator.planner.field_plan import FieldRequest, make_field_plan
+
         limits = (seed, stop, progress, bound_s, bound_frac, threads, modest)
         return make_field_plan(FieldRequest(mission, method, clock, *limits))
     begin_s = clock.now_s()
@@ -234,7 +232,11 @@ def make_plan(
         seed=seed,
         bound=bound,
     )
-    return plan if mission.schema == 1 else with_straight_schedule(plan, problem)
+    if mission.schema == 1:
+        return plan
+    from coordinator.planner.field_schedule import with_straight_schedule
+
+    return with_straight_schedule(plan, problem)
 
 
 @dataclass(frozen=True, slots=True)

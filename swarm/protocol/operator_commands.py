@@ -69,6 +69,8 @@ def zones_in_force(replica: Replica) -> tuple[ZoneSpec, ...]:
     brief = replica.brief
     if brief is None:
         return ()
+    if not replica.zone_edits:
+        return brief.zones
     zones = {zone.id: zone for zone in brief.zones}
     for name, edit in zone_edits(replica).items():
         if edit.withdrawn:

@@ -9,13 +9,16 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
-from swarm.allocation.legs import Airspace, FlightModel, LegNetwork
 from swarm.model import Base, Mission, Task, Uav
 from swarm.model.layers import FlightLayers
+
+if TYPE_CHECKING:
+    from swarm.allocation.legs import FlightModel, LegNetwork
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
@@ -59,6 +62,9 @@ class FieldNetwork:
         tasks: Sequence[Task],
         layers_m: Sequence[float] | None = None,
     ) -> None:
+        # Only where it is needed: plain missions would start a tenth later.
+        from swarm.allocation.legs import Airspace, LegNetwork
+
         if layers_m is not None and len(layers_m) != len(uavs):
             raise ValueError(f"layers_m must have a height for each of {len(uavs)} UAVs")
         self._layers_m = (
@@ -308,6 +314,8 @@ def _points(task: Task) -> list[tuple[float, float, float]]:
 
 def flight_model(uav: Uav, wind_enu_m_s: tuple[float, float]) -> FlightModel:
     """How ``uav`` flies in that wind [m/s; east, north]."""
+    from swarm.allocation.legs import FlightModel
+
     airspeed_m_s, speed_m_s = uav.airspeed_m_s, uav.speed_m_s
     if airspeed_m_s is None:
         return FlightModel(speed_m_s, uav.acceleration_m_s2)
