@@ -212,6 +212,7 @@ def agent(
       --keys keys/quad-2 --connect tls/192.168.1.2:7447 --state /var/lib/peckorder
     """
     from agent.core.agent_core import AgentCore
+    from agent.core.path_clearance import PATH_CLEARANCE_M
     from agent.links.mavlink_vehicle import MavlinkVehicle
     from agent.vehicle.config import BridgeConfig
     from agent.vehicle.signing import load_signing_key
@@ -265,6 +266,7 @@ def agent(
             0.0 if memory is None else memory.age_s,
             rejoin=rejoin,
             without_bus_s=None if without_bus_s is None else without_bus_s * speedup,
+            path_clearance_m=PATH_CLEARANCE_M,
         )
 
     clock = ScaledClock(speedup)

@@ -22,10 +22,15 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 PATH_CLEARANCE_M = 3.0
-"""How much farther than their margin vehicles are led past zones [m]: they cut corners by 2 m."""
+"""How much farther than their margin vehicles are led past zones [m]: they cut
+corners by 2 m at most."""
 
 _SHARES = (1.0, 0.5, 0.25)
 """Of the clearance, tried one after the other."""
+
+_LONGER, _LONGER_CLEARANCES = 1.05, 6.0
+"""A way may become so many times as long, and by so many clearances: energy was reckoned with the
+shortest."""
 
 _SLACK = 1.0 / 3.0
 """Of the clearance, by which round corners may be flown straighter."""
@@ -63,7 +68,8 @@ class PathClearance:
             if planner.clear(way[:-1, :2], way[1:, :2]).all():
                 break
             flat_m = _path_m(planner, true, way[0, :2], way[-1, :2], clearance_m)
-            if flat_m is not None:
+            longest_m = _LONGER * _length_m(way[:, :2]) + _LONGER_CLEARANCES * clearance_m
+            if flat_m is not None and _length_m(flat_m) <= longest_m:
                 return _at_heights(flat_m, float(way[0, 2]), float(way[-1, 2]))
         return tuple(way_enu_m)
 
@@ -91,6 +97,10 @@ def _path_m(
         if true.clear(flat_m[leaves:-1], flat_m[leaves + 1 :]).all():
             return flat_m
     return None
+
+
+def _length_m(flat_m: FloatArray) -> float:
+    return float(np.hypot(*np.diff(flat_m, axis=0).T).sum())
 
 
 def _at_heights(flat_m: FloatArray, first_m: float, last_m: float) -> tuple[Point, ...]:

@@ -121,8 +121,9 @@ class BridgeConfig:
     for simulated ones, beside which nobody stands."""
     full_battery_frac: float = 0.9
     """Charge from which on a battery counts as changed, 0..1."""
-    corner_m: float = 2.0
-    """How far corners of a path may be cut [m]."""
+    corner_m: float = 4.0
+    """How far corners of a path may be cut by a vehicle that turns as it is reckoned to [m]; real
+    ones have become slower by then, and cut them by half of it at most."""
     disarm_after_s: float = 10.0
     """A vehicle that has landed for another battery disarms by itself within that time, or is
     told to."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from agent.core.interface import GoTo, Home, Refused, Return, Swap
+from agent.core.interface import GoTo, Home, KeepOut, Prepare, Ready, Refused, Return, Swap
 from agent.core.states import AgentState
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import CommandKind, MissionPhase
@@ -594,7 +594,7 @@ def test_a_hold_long_enough_to_use_the_battery_up_ends_with_the_way_home(script:
 
     assert agent.state() is AgentState.RETURNING_VIA_START
     assert agent.way_home.via_enu_m == ABOVE_START
-    assert not agent.way_home.land
+    assert agent.way_home.land, "its own way may lead to a base that it took off from"
 
 
 def test_at_the_end_of_the_mission_who_stands_at_a_base_is_home(script: Script) -> None:
@@ -691,3 +691,33 @@ def test_its_status_tells_of_the_visit(script: Script) -> None:
     assert said.phase is StatusPhase.SERVING
     assert said.note == "swaps its battery at base b0"
     assert [claim.stage for claim in claims(agent.log)][-1] is BaseStage.LANDED
+
+
+def test_the_operators_word_lets_a_vehicle_on_the_ground_start_again(script: Script) -> None:
+    agent = on_its_way(script)
+    agent.vouched("u0", 10.0)  # of nothing that is to come
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.touch_down(50.0)
+    assert agent.landing.swap_s == SWAP_S
+    agent.vouched("u1", 55.0)
+    agent.run_until(60.0)
+    assert isinstance(agent.last_order, Swap)
+
+    agent.vouched("u0", 61.0)
+    agent.run_until(70.0)
+
+    assert [each for each in orders(agent.log) if isinstance(each, Ready)] == [Ready(agent.leg)]
+    assert agent.state() is AgentState.SWAPPING, "its vehicle has not said that it is full"
+
+
+def test_its_vehicle_learns_of_zones_before_what_heeds_them(script: Script) -> None:
+    zone, drawn = square("z0", 500.0, 0.0), square("z1", 400.0, 300.0)
+    agent = on_its_way(script, zones=(zone,))
+    told = orders(agent.log)
+    assert told[0] == KeepOut((zone.zone(),), 0.0)
+    assert isinstance(told[1], Prepare)
+
+    agent.drawn(drawn, 10.0)
+
+    assert orders(agent.log)[-2:] == [KeepOut((zone.zone(), drawn.zone()), 0.0), agent.flight]

@@ -267,7 +267,7 @@ def test_with_nothing_to_do_it_goes_to_its_start_for_good_if_that_is_nearest(
 
     assert agent.state() is AgentState.RETURNING_VIA_START
     assert agent.way_home.via_enu_m == ABOVE_START
-    assert not agent.way_home.land
+    assert agent.way_home.land
     assert agent.phase is ClaimPhase.OUT
 
 

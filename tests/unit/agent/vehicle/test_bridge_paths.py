@@ -55,7 +55,7 @@ def test_a_path_is_flown_round_its_corners_without_a_stop(flight: BridgeFlight) 
     assert flight.now_s - begun_s <= length_m / 4.0 + 5.0
     for corner in ROUND:
         nearest_m = min(math.dist(corner, each.position_enu_m) for each in flight.telemetry)
-        assert nearest_m <= 4.0  # this vehicle turns at once, and so cuts more than real ones
+        assert nearest_m <= 6.0  # this vehicle turns at once, and so cuts more than real ones
 
 
 def test_no_straight_line_through_a_zone_is_flown(flight: BridgeFlight) -> None:
