@@ -130,6 +130,11 @@ class SimulatedAutopilot:
             self._report(now_s)
         return self._outbox.take()
 
+    @property
+    def is_without_power(self) -> bool:
+        """Whether somebody is changing its battery just now, so that it hears and says nothing."""
+        return self._power_returns_s is not None
+
     def next_deadline_s(self) -> float:
         """When `step` should be called at the latest [s]."""
         if self._power_returns_s is not None:

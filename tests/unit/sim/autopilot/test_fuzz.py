@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.codec import ChannelCodec
+from sim.autopilot.config import ServedBase
 from sim.autopilot.events import MavlinkReceived, Reboot, TimeAdvanced
 from sim.autopilot.firmware import FirmwareModelName, firmware_model
 from tests.support.ground_station import GroundStation, ground_station, only
@@ -40,6 +41,16 @@ UNDERSTOOD = [
     "heartbeat",
 ]
 COMMANDS = [16, 20, 21, 22, 176, 178, 179, 183, 192, 224, 246, 300, 400, 410, 510, 511, 512, 520]
+COMMANDS += [206, 5001, 5002, 5003, 5004]
+FIELD: dict[str, Any] = {
+    "endurance_s": 60.0,
+    "drains_in_flight": True,
+    "bases": (ServedBase((0.0, 0.0, 0.0), 12.0),),
+    "acceleration_m_s2": 2.5,
+    "rounds_corners": True,
+    "descent_m_s": 3.0,
+}
+"""A mission of the field, whose base is where the vehicle stands."""
 NUMBERS: dict[str, st.SearchStrategy[Any]] = {
     "float": st.one_of(
         st.floats(width=32),
@@ -106,11 +117,15 @@ def all_messages_of_the_vehicle(ground: GroundStation) -> None:
     steps=st.lists(st.tuples(messages(), st.floats(0.0, 20.0)), max_size=25),
     airborne=st.booleans(),
     flavour=FLAVOURS,
+    config=st.sampled_from([{}, FIELD]),
 )
 def test_arbitrary_messages_are_survived(
-    steps: list[tuple[Any, float]], airborne: bool, flavour: FirmwareModelName
+    steps: list[tuple[Any, float]],
+    airborne: bool,
+    flavour: FirmwareModelName,
+    config: dict[str, Any],
 ) -> None:
-    ground = ground_station(firmware_model(flavour))
+    ground = ground_station(firmware_model(flavour), **config)
     if airborne:
         in_the_air(ground)
     else:
@@ -122,6 +137,8 @@ def test_arbitrary_messages_are_survived(
         ground.step(TimeAdvanced())
         assert ground.vehicle.next_deadline_s() >= ground.now_s
         assert all(math.isfinite(value) for value in ground.position_enu_m)
+    while ground.vehicle.is_without_power:
+        ground.wait(1.0)
     all_messages_of_the_vehicle(ground)
     ground.step(Reboot())
     ground.now_s += 5.0

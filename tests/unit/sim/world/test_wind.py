@@ -39,6 +39,18 @@ def test_ordered_speed_is_flown_in_still_air_whatever_the_airspeed() -> None:
     assert motion.arrives_s == 4.0
 
 
+@pytest.mark.parametrize(("exact", "against_m_s"), [(False, 8.0), (True, 6.0)])
+def test_an_exact_airspeed_is_kept_where_a_greater_speed_is_ordered(
+    exact: bool, against_m_s: float
+) -> None:
+    motion = WindyMotion(IdealMotion((0.0, 0.0, 10.0)), Wind((2.0, 0.0)), 8.0, 0.0, exact=exact)
+    motion.fly_to((-100.0, 0.0, 10.0), 10.0, 0.0)
+    assert motion.arrives_s == pytest.approx(100.0 / against_m_s)
+    motion.stop(0.0)
+    motion.fly_to((100.0, 0.0, 10.0), 10.0, 0.0)
+    assert motion.arrives_s == pytest.approx(10.0)
+
+
 def test_wind_that_cannot_be_flown_against_is_refused() -> None:
     with pytest.raises(ValueError, match="airspeed must exceed"):
         windy(6.0, 8.0)
