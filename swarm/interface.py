@@ -171,20 +171,26 @@ def evaluate(mission: Mission, routes: Mapping[UavId, Sequence[TaskId]]) -> Eval
 
     Args:
         mission: whose UAVs and tasks, pop-ups included.
-        routes: task ids by UAV id in order of execution; UAVs that are left out do nothing.
+        routes: task ids by UAV id in order of execution; UAVs that are left out do nothing. In the
+            field also the bases where batteries are changed, as ``"base:b0"``; lines are flown
+            whichever way is better at that place of the list.
 
     Raises:
-        ValueError: an id is unknown, or a task is on the lists twice.
+        ValueError: an id is unknown, a task is on the lists twice, or in the field one cannot be
+            done there.
     """
     from swarm.allocation.objective import evaluate as value
     from swarm.allocation.problem import Problem
-    from swarm.scenario import require_plain
+    from swarm.model.mission import PLAIN_CONSTRAINTS
 
-    require_plain(mission, "swarm.evaluate")
+    if unknown := routes.keys() - {uav.id for uav in mission.uavs}:
+        raise ValueError(f"no such UAV in {mission.name}: {', '.join(sorted(unknown))}")
+    if not PLAIN_CONSTRAINTS.issuperset(mission.constraints):
+        from swarm.allocation.field.lists import evaluate_in_field
+
+        return evaluate_in_field(mission, routes)
     problem = Problem.from_mission(mission)
     columns = {task: column for column, task in enumerate(problem.task_ids)}
-    if unknown := [uav for uav in routes if uav not in problem.uav_ids]:
-        raise ValueError(f"no such UAV in {mission.name}: {', '.join(unknown)}")
     wanted = [task for tasks in routes.values() for task in tasks]
     if lacking := [task for task in wanted if task not in columns]:
         raise ValueError(f"no such task in {mission.name}: {', '.join(lacking)}")

@@ -17,6 +17,7 @@ import sim.interface
 import swarm
 from sim.world.uncertainty import Uncertainty
 from swarm.interface import UncertaintyOptions
+from swarm.model import UavId
 
 UPPER: dict[str, Callable[..., Any]] = {
     "plan": coordinator.interface.plan,
@@ -182,3 +183,29 @@ def test_wrong_input_is_told_in_one_line(call: Callable[[], object], line: str) 
     said = str(caught.value)
     assert line in said
     assert "\n" not in said
+
+
+def test_lists_of_the_field_are_worth_what_their_plan_says_with_swaps_on_them() -> None:
+    mission = swarm.load("reservoir-inspection")
+    made = swarm.plan(mission, "greedy", bound=False)
+    assert made.schedule is not None
+    # The last entry is the way home, which is on no list.
+    lists = {uav: [entry.go for entry in made.schedule[uav][:-1]] for uav in made.routes}
+
+    found = swarm.evaluate(mission, lists)  # type: ignore[arg-type]
+
+    assert any(name.startswith("base:") for names in lists.values() for name in names)
+    assert found.objective >= made.objective - 1e-6
+    assert found.completion_s.keys() == made.completion_s.keys()
+
+
+def test_a_list_of_the_field_that_cannot_be_flown_is_refused_with_the_reason() -> None:
+    mission = swarm.load("reservoir-inspection")
+    far = ("weir", "chapel", "quarry", "gauge")
+
+    with pytest.raises(ValueError, match=r"uav1 cannot do \w+ there: its battery does not last"):
+        swarm.evaluate(mission, {UavId("uav1"): far})  # type: ignore[dict-item]
+    with pytest.raises(ValueError, match="no such task or base in reservoir-inspection: base:b9"):
+        swarm.evaluate(mission, {UavId("uav1"): ("base:b9",)})  # type: ignore[dict-item]
+    with pytest.raises(ValueError, match="more than once on the lists: weir"):
+        swarm.evaluate(mission, {UavId("uav1"): ("weir", "weir")})  # type: ignore[dict-item]
