@@ -80,7 +80,11 @@ class ObservedFlights:
         if flight.fixes and flight.fixes[-1][0] >= status.mission_s:
             return
         place = east_m, north_m, up_m + layer_m
-        if any(_stands_at(place, ground) for ground in grounds):
+        # At a base agents tell the ground that they stand on, elsewhere where they are without
+        # their layer.
+        lands = flight.claim is not None and flight.claim.stage in _ON_THE_GROUND
+        low = (place, status.position_enu_m) if lands else (place,)
+        if any(_stands_at(each, ground) for each in low for ground in grounds):
             flight.fixes.clear()
             return
         flight.fixes.append((status.mission_s, place))

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from swarm.allocation.field.problem import FieldProblem
 from swarm.allocation.field.state import FieldState
 from swarm.kernels.field import FieldRefusal, FlownLists, fly_lists
-from swarm.model import Evaluation, Mission, TaskId
+from swarm.model import Evaluation, Mission, TaskId, UavId
 from swarm.model.plan import at_base
 
 _WHY = {
@@ -22,7 +22,7 @@ _WHY = {
 }
 
 
-def evaluate_in_field(mission: Mission, routes: Mapping[str, Sequence[str]]) -> Evaluation:
+def evaluate_in_field(mission: Mission, routes: Mapping[UavId, Sequence[str]]) -> Evaluation:
     """What lists are worth by eq. 1 under the mission's constraints.
 
     Args:

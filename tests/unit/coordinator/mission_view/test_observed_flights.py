@@ -87,3 +87,29 @@ def test_of_a_fleet_that_said_nothing_nothing_is_told() -> None:
 
     assert flights.executed_schedule(MISSION) == {UavId("u0"): (), UavId("u1"): ()}
     assert flights.closest_approach_m is None
+
+
+def test_who_stands_at_a_base_comes_close_to_nobody() -> None:
+    flights, base = ObservedFlights(), MISSION.bases[0].position_enu_m
+    landed = Claim(
+        ClaimPhase.HELD, None, 0.0, 0, 19.5, base="b0", stage=BaseStage.LANDED, arrives_s=9.5
+    )
+    flights.hear("u0", landed)
+    for mission_s in (10.0, 11.0, 12.0):
+        flights.hear_status("u0", status(StatusPhase.SERVING, mission_s, *base[:2]), 10.0, [base])
+        flights.hear_status("u1", status(StatusPhase.FLYING, mission_s, *base[:2]), 13.0, [base])
+
+    assert flights.closest_approach_m is None
+
+
+def test_a_list_that_ends_at_a_base_has_no_other_way_home() -> None:
+    flights = ObservedFlights()
+    landed = Claim(
+        ClaimPhase.HELD, None, 0.0, 0, 19.5, base="b0", stage=BaseStage.LANDED, arrives_s=9.5
+    )
+    parked = Claim(ClaimPhase.IDLE, None, 19.5, 0, 19.5, base="b0", stage=BaseStage.PARKED)
+    for claim in (landed, parked, Claim(ClaimPhase.OUT, None, 41.0, 0, 41.0)):
+        flights.hear("u0", claim)
+    flights.hear_status("u0", status(StatusPhase.HOME, 41.0, 5.0, 5.0), 10.0)
+
+    assert [entry.go for entry in flights.executed_schedule(MISSION)["u0"]] == ["base:b0"]  # type: ignore[index]

@@ -1,0 +1,104 @@
+"""A mission of the field flown by real processes: zones, a base, batteries for half of the list."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from swarm.model import Base, BaseId, Mission, Origin, Task, TaskId, Uav, UavId, Zone, ZoneId
+from tests.process.mission import SwarmRun
+from tests.process.pace import pace
+from tests.process.test_secure_run import swarm, written
+
+pytestmark = [pytest.mark.process]
+
+PLACES = ((50, 200), (150, 260), (330, 250), (420, 60), (330, -130), (120, -150))
+POND = ((180.0, 40.0), (280.0, 40.0), (280.0, 160.0), (180.0, 160.0))
+HERD = ((200.0, -100.0), (280.0, -100.0), (240.0, -20.0))
+
+
+def pasture() -> Mission:
+    """Two UAVs and six tasks round a pond and a herd, and a barn where batteries are changed."""
+    uavs = [
+        Uav(
+            UavId(f"uav{number + 1}"),
+            (20.0 * number, 0.0, 0.0),
+            10.0,
+            acceleration_m_s2=2.5,
+            endurance_s=180.0,
+            reserve_frac=0.4,
+        )
+        for number in range(2)
+    ]
+    tasks = [
+        Task(TaskId(f"t{number + 1}"), (float(east_m), float(north_m), 0.0), 5.0, service_s=5.0)
+        for number, (east_m, north_m) in enumerate(PLACES)
+    ]
+    return Mission(
+        name="pasture",
+        horizon_s=900.0,
+        uavs=tuple(uavs),
+        tasks=tuple(tasks),
+        origin=Origin(46.8, 9.7, 1100.0),
+        bases=(Base(BaseId("barn"), (80.0, -40.0, 0.0), swap_s=15.0, slots=1),),
+        zones=(Zone(ZoneId("pond"), POND), Zone(ZoneId("herd"), HERD)),
+        zone_margin_m=10.0,
+    )
+
+
+def visited(told: dict[str, Any], key: str) -> list[str]:
+    """Where UAVs went, or were to go, but for their way home."""
+    return [entry["go"] for entries in told[key].values() for entry in entries]
+
+
+@pytest.mark.parametrize("more", [["--command", "reposition"], ["--autopilot", "sim-px4"]])
+def test_every_task_is_done_round_zones_with_batteries_changed_on_the_way(
+    tmp_path: Path, more: list[str]
+) -> None:
+    mission, folder = pasture(), tmp_path / "run"
+    folder.mkdir()
+    words = [written(mission, tmp_path), "--speedup", f"{pace(8.0):g}", *more]
+    with SwarmRun(words, folder) as run:
+        status, told = run.result()
+        run.assert_nothing_left()
+
+    assert status == 0, run.story()
+    assert sorted(told["done"]) == [task.id for task in mission.tasks]
+    assert told["left_out"] == {}
+    assert "base:barn" in visited(told, "schedule")
+    assert "base:barn" in visited(told, "executed_schedule")
+    assert told["executed_schedule"].keys() == {"uav1", "uav2"}
+    assert told["closest_approach_m"] > 0.0
+    assert math.isclose(
+        told["makespan_s"],
+        max(
+            entry["end_s"]
+            for entries in told["executed_schedule"].values()
+            for entry in entries
+            if entry["go"] in told["done"]
+        ),
+    )
+
+
+def test_a_zone_drawn_in_flight_is_known_to_all_and_shown(tmp_path: Path) -> None:
+    mission, folder = replace(pasture(), zones=()), tmp_path / "run"
+    folder.mkdir()
+    words = [written(mission, tmp_path), "--speedup", f"{pace(4.0):g}"]
+    with SwarmRun(words, folder) as run:
+        run.wait_for_line("epoch 1")
+        corners = [f"{east_m:g},{north_m:g}" for east_m, north_m in POND]
+        drawn = swarm("zone", "add", "pond", "--polygon", *corners, "--json")
+        shown = swarm("status", "--json")
+        status, told = run.result()
+        run.assert_nothing_left()
+
+    assert drawn.returncode == 0, drawn.stderr
+    assert json.loads(drawn.stdout)["obeyed"]
+    assert json.loads(shown.stdout)["zones"] == ["pond"]
+    assert status == 0, run.story()
+    assert sorted(told["done"]) == [task.id for task in mission.tasks]
