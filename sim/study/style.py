@@ -79,7 +79,7 @@ QUANTITIES = {
 FIELD_QUANTITIES = {
     "endurance_frac": Quantity("endurance", "% of a list", "batteries last for {} % of a list"),
     "bases": Quantity("bases", "", "{} bases"),
-    "slots": Quantity("slots of a base", "", "{} slots at each"),
+    "slots": Quantity("slots of a base", "", "slots at each: {}"),
     "swap_s": Quantity("swap of a battery", "s", "a swap takes {} s"),
     "zones": Quantity("zones", "", "{} zones"),
     "windows_frac": Quantity("tasks with windows", "%", "{} % of the tasks have windows"),
