@@ -204,8 +204,8 @@ class FieldTasking(Tasking):
             if haven is None:
                 self._stay_idle(now_s)
             else:
-                told_s = {"arrives_s": decision.arrive_s, "ready_s": decision.end_s}
-                self._visit_base(replace(haven, **told_s), now_s)
+                arrives_s, ready_s = decision.arrive_s, decision.end_s
+                self._visit_base(replace(haven, arrives_s=arrives_s, ready_s=ready_s), now_s)
 
     def _divert_in_field(self, now_s: float) -> None:
         problem, epoch, claim = self._flights.problem, self._replica.epoch, self.claim

@@ -138,7 +138,7 @@ class Obstacles:
         out_m = np.array(out.coords[0])
         return out_m if self.free(out_m[None])[0] else np.array(place_m, dtype=np.float64)
 
-    def _ways_out(self, point: shapely.Geometry) -> list[shapely.Geometry]:
+    def _ways_out(self, point: shapely.Geometry) -> list[shapely.LineString]:
         """Straight ways to every piece of the border of what the place is in, shortest first."""
         import shapely
 
@@ -151,8 +151,9 @@ class Obstacles:
         ends_m = [np.stack([each[:-1], each[1:]], axis=1) for each in corners_m]
         if not ends_m:
             return []
-        ways = shapely.shortest_line(shapely.linestrings(np.concatenate(ends_m)), point)
-        return list(ways[np.argsort(shapely.length(ways), kind="stable")])
+        pieces = np.atleast_1d(np.asarray(shapely.linestrings(np.concatenate(ends_m))))
+        ways: list[shapely.LineString] = list(shapely.shortest_line(pieces, point))
+        return sorted(ways, key=lambda way: way.length)
 
     def _enters(self, way: shapely.Geometry, begin: shapely.Geometry) -> bool:
         """Whether ``way`` comes into a shape in which it does not begin."""

@@ -14,5 +14,4 @@ def script(monkeypatch: pytest.MonkeyPatch) -> Script:
     told = Script()
     monkeypatch.setattr(field_tasking, "decide_in_field", told.decide)
     monkeypatch.setattr(field_tasking, "divert_in_field", lambda *_: None)
-    monkeypatch.setattr(field_tasking, "field_rule_of", lambda name, routes: (name, routes))
     return told

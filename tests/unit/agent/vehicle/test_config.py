@@ -12,6 +12,11 @@ from agent.vehicle.config import BridgeConfig
 from tests.support.bridge_flight import ORIGIN
 
 CONFIG = BridgeConfig(1, ORIGIN)
+NUMBERS = [
+    each.name
+    for each in fields(CONFIG)
+    if (each.type == "float" or each.name.endswith("_tries")) and each.name != "zone_margin_m"
+]
 
 
 @pytest.mark.parametrize("system_id", [0, -1, 256])
@@ -21,13 +26,18 @@ def test_system_id_must_be_one_of_mavlink(system_id: int) -> None:
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf])
-@pytest.mark.parametrize(
-    "name", [f.name for f in fields(CONFIG) if f.type == "float" or f.name.endswith("_tries")]
-)
+@pytest.mark.parametrize("name", NUMBERS)
 def test_every_number_must_be_positive_and_finite(name: str, value: float) -> None:
     changed: dict[str, Any] = {name: value}
     with pytest.raises(ValueError, match=name):
         replace(CONFIG, **changed)
+
+
+@pytest.mark.parametrize("value", [-1.0, math.nan, math.inf])
+def test_a_margin_is_not_negative(value: float) -> None:
+    with pytest.raises(ValueError, match="zone_margin_m"):
+        replace(CONFIG, zone_margin_m=value)
+    assert replace(CONFIG, zone_margin_m=0.0).zone_margin_m == 0.0
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0, -0.1, math.nan])

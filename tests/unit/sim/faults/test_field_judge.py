@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
 from itertools import pairwise
+from typing import Any
 
 import pytest
 
@@ -224,7 +225,7 @@ def test_who_turns_in_flight_may_be_astray_by_what_its_agent_does_not_know_yet()
     ],
 )
 def test_who_is_in_a_zone_has_as_long_as_its_shortest_way_out_takes(
-    out_s: float, uav: dict[str, float], slowed: dict[str, float], is_sound: bool
+    out_s: float, uav: dict[str, Any], slowed: dict[str, float], is_sound: bool
 ) -> None:
     world = on_a_way((0.0, 100.0, 0.0), (25.0, 100.0, 0.0), (25.0 + out_s, 110.01, 0.0))
     me = replace(MISSION.uavs[0], **uav)
