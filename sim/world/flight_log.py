@@ -144,7 +144,7 @@ class FlightLog:
                 base = self._base_at(order.position_enu_m)
                 leg = flown.open
                 if leg is not None and leg.came is not None:
-                    leg = flown.open = leg.came  # it has waited beside the slots
+                    leg = self._rise(uav, flown, leg, leg.came, now_s)
                 flown.home = None
                 if base is not None and (leg is None or leg.task is not None):
                     here, there = place_enu_m[:2], order.position_enu_m[:2]
@@ -270,6 +270,20 @@ class FlightLog:
         if waits is not None and waits.arrive_s is not None and base is not None:
             leg.came = waits
         flown.open, flown.home = leg, None
+
+    def _rise(
+        self, uav: str, flown: _Flown, home: _OpenLeg, came: _OpenLeg, now_s: float
+    ) -> _OpenLeg:
+        """It has stood beside the slots of a base, as at home, and takes one of them now.
+
+        So it is told: it came home there, which ends its sortie, and later swaps from there.
+        """
+        came.go, came.base = home.go, self._base_at((*home.via_m[-1], 0.0))
+        came.arrive_s = came.begin_s = min(now_s, self._touch_down_s(uav, home))
+        flown.entries.append(_entry(came, came.arrive_s))
+        there = came.via_m[-1]
+        flown.open = _OpenLeg(None, 1, now_s, there, [there], came.leg, came.go, came.base)
+        return flown.open
 
     def _passed_m(self, uav: str, since_s: float, now_s: float) -> list[_MapPoint]:
         """Corners that it has flown through."""
