@@ -79,7 +79,7 @@ def leftovers(
 
 def _without_blocked_bases(scenario: FieldScenario, world: World, at_s: float) -> FieldScenario:
     """Only bases of which lost UAVs have left a slot free: those stand there for good."""
-    standing = [
+    standing: list[str] = [
         stay.base
         for stay in world.flight_log.stays
         if stay.begin_s <= at_s and stay.end_s == math.inf and stay.uav not in world.finished
