@@ -49,9 +49,8 @@ class FieldTasking(Tasking):
         self._visits = BaseVisits(context, self._flights, self._sortie, self._visit_over)
         self._limits = TimeLimits(context, self._flights, self._sortie)
         self._refused_bases = RefusedTasks(context.timing.reconsider_s)
-        self._havens = Havens(
-            context, self._flights, self._sortie, self._visits, self._refused_bases
-        )
+        known = self._flights, self._sortie, self._visits
+        self._havens = Havens(context, *known, self._refused_bases)
         self._departed_from: str | None = None
         """The base that it has just been sent off from, until it has arrived anywhere."""
         self._drained = False
@@ -401,9 +400,8 @@ class FieldTasking(Tasking):
         """The battery lasts less long than was known: give up what can't be done on it."""
         self._drained = False
         task, claim, state = self._task(), self.claim, self._machine.state
-        if claim is None or task is None or not self._in_field:
-            return
-        if state not in (AgentState.FLYING, AgentState.SERVING):
+        works = state in (AgentState.FLYING, AgentState.SERVING)
+        if claim is None or task is None or not (works and self._in_field):
             return
         if not self._limits.lasts(task, claim):
             self._release("its battery does not last", now_s)
@@ -470,9 +468,9 @@ class FieldTasking(Tasking):
             self._visits.come_down(now_s)
             return
         home = self._havens.home(now_s)
-        if self._machine.state is not AgentState.IDLE or home is None or home.base is None:
-            return
-        haven = self._havens.reach(home.base, now_s)
+        idles = self._machine.state is AgentState.IDLE
+        base = home.base if idles and home is not None else None
+        haven = None if base is None else self._havens.reach(base, now_s)
         if haven is not None and self._havens.is_usable(haven.base, now_s):
             self._visit_base(haven, now_s)
             self._home_at_s = self._leaves_at_s(now_s)
