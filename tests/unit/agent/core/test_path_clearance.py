@@ -71,18 +71,18 @@ def test_a_task_beside_a_zone_is_still_flown_to() -> None:
 
 
 @given(
-    st.lists(st.tuples(st.floats(-80.0, 80.0), st.floats(-80.0, 80.0)), min_size=2, max_size=2),
+    st.lists(st.tuples(st.integers(-80, 80), st.integers(-80, 80)), min_size=2, max_size=2),
     st.sampled_from([0.0, 4.0]),
 )
 def test_whatever_the_ends_no_way_meets_a_zone(
-    ends: list[tuple[float, float]], margin_m: float
+    ends: list[tuple[int, int]], margin_m: float
 ) -> None:
     import numpy as np
 
     planner = PathPlanner([WALL], margin_m)
-    begin, end = np.array(ends[0]), np.array(ends[1])
+    begin, end = np.array(ends[0], dtype=float), np.array(ends[1], dtype=float)
     flat_m = planner.path_m(begin, end)
-    if flat_m is None or not planner.free(np.array(ends)).all():
+    if flat_m is None or not planner.free(np.array(ends, dtype=float)).all():
         return
     shortest = tuple((float(x), float(y), 10.0) for x, y in flat_m)
 
