@@ -243,6 +243,8 @@ class BridgeWatch:
             case Swap(leg, position_enu_m):
                 self._base_m = position_enu_m
                 self._task = _Task(places_m, leg, position_enu_m)
+            case Hold() if self.bridge.phase is FlightPhase.STANDING:
+                pass  # it stands already, and is looked after as before
             case Hold() | Return():
                 self._task = _Task(places_m)
         self._task.told_m.extend(self._heres_m)

@@ -55,10 +55,6 @@ def landed(fake: type[FakeCopter], config: BridgeConfig, percent: int = 30) -> B
     return flight
 
 
-def phase_of(flight: BridgeFlight) -> FlightPhase:
-    return flight.bridge.phase
-
-
 def changed(flight: BridgeFlight, silent_s: float = 8.0) -> None:
     """A person changes the battery, which switches the autopilot off and on."""
     flight.copter.silent = True
@@ -73,7 +69,7 @@ def test_it_lands_waits_for_word_and_battery_and_flies_on(
 ) -> None:
     flight = landed(fake, config)
     assert not flight.copter.armed
-    assert phase_of(flight) is FlightPhase.STANDING
+    assert flight.bridge.phase is FlightPhase.STANDING
 
     changed(flight)
     assert Swapped(3) not in flight.reports, "nobody has let it start"
@@ -85,7 +81,7 @@ def test_it_lands_waits_for_word_and_battery_and_flies_on(
     flight.order(GoTo(4, (40.0, 0.0, 12.0)))
     flight.run_until(Arrived(4), limit_s=120.0)
     assert flight.copter.count()[TAKEOFF] == 1
-    assert phase_of(flight) is FlightPhase.HOVERING
+    assert flight.copter.airborne
     assert not [each for each in flight.reports if isinstance(each, HandedOver)]
 
 
