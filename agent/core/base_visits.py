@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import partial
 
 from agent.core.context import AgentContext, AgentPart
 from agent.core.energy import SortieClock
@@ -288,8 +287,13 @@ class BaseVisits(AgentPart):
         claims = {uav: each for uav, each in self._replica.claims.items() if uav in credible}
         claims[self._uav] = claim
         everybody = claims, self.blocking()
-        may_land = partial(bases.may_land, waited=visit.waited, punctual=visit.punctual)
-        if may_land(self._uav, base.id, base.slots, *everybody, swap_s=base.swap_s):
+        may_land = bases.may_land(
+            *(self._uav, base.id, base.slots, *everybody),
+            waited=visit.waited,
+            punctual=visit.punctual,
+            swap_s=base.swap_s,
+        )
+        if may_land:
             self._land(base, claim, now_s)
         elif claim.stage is BaseStage.APPROACHING and claim.phase is ClaimPhase.HELD:
             visit.waited_at_s = now_s + self._timing.objection_window_s
