@@ -38,6 +38,7 @@ from agent.vehicle.firmware import firmware_of
 from agent.vehicle.hand_over import HandOver, HandOverReason, LinkLoss, hand_over
 from agent.vehicle.landing import Landing
 from agent.vehicle.messages import CommandAck, DecodedMessage, GroundHeartbeat, Heartbeat, Position
+from agent.vehicle.obedience import obey
 from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning
 from agent.vehicle.session import (
@@ -51,7 +52,7 @@ from agent.vehicle.session import (
 from agent.vehicle.signing import Signing
 from agent.vehicle.state import PositionNews
 from agent.vehicle.supervision import intervention
-from agent.vehicle.transitions import follow, follow_mission, obey
+from agent.vehicle.transitions import follow, follow_mission
 from swarm.model.frames import enu_from_wgs84
 from swarm.protocol.timing import StallDetector
 
