@@ -17,6 +17,8 @@ from sim.world.motion import Point, minus, plus
 
 _AT_REST: Point = (0.0, 0.0, 0.0)
 _STILL_M_S = 1e-9
+_NO_WAY_M = 1e-9
+"""A way as short has no direction that could be told."""
 
 
 def _scaled(vector: Point, by: float) -> Point:
@@ -145,7 +147,7 @@ class TurningMotion:
         here, velocity = self._leg.at(now_s)
         whole, moves_m_s = minus(target_enu_m, here), math.hypot(*velocity)
         length_m = math.hypot(*whole)
-        if length_m > 0.0:
+        if length_m > _NO_WAY_M:
             along = _scaled(whole, 1.0 / length_m)
         else:
             along = _scaled(velocity, 1.0 / moves_m_s) if moves_m_s > _STILL_M_S else _AT_REST

@@ -6,7 +6,7 @@ import math
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from sim.autopilot.firmware.px4 import Px4Model
@@ -98,6 +98,7 @@ def test_a_target_that_changes_before_a_corner_is_turned_to_as_recorded() -> Non
 
 
 @given(steps=STEPS)
+@example(steps=[((0.0, 0.0, 0.0), 2.0, 6.0), ((0.0, 0.0, 1e-309), 1.0, 1.0)])
 def test_turning_motion_is_continuous_ends_at_its_target_and_keeps_its_limits(
     steps: list[Step],
 ) -> None:
