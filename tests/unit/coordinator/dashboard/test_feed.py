@@ -16,7 +16,7 @@ from swarm.protocol.uav_messages import AttemptResult, Candidate, Choice, Choice
 from tests.support.builders import MISSION, OUT
 from tests.support.desk_play import DeskPlay, FakePlayer
 
-KEYS = {"uavs": "id", "tasks": "id", "lists": "uav", "commands": "n"}
+KEYS = {"uavs": "id", "tasks": "id", "lists": "uav", "zones": "id", "commands": "n"}
 LOGS = ("story", "choices", "objective_curve")
 
 
