@@ -131,14 +131,14 @@ class Obstacles:
         import shapely
 
         point = shapely.Point(place_m)
-        out = shapely.shortest_line(self._border, point)
+        out: shapely.Geometry = shapely.shortest_line(self._border, point)
         if self._enters(out, point):
             ways = self._ways_out(point)
             out = next((way for way in ways if not self._enters(way, point)), out)
-        out_m = np.array(out.coords[0])
+        out_m = shapely.get_coordinates(out)[0]
         return out_m if self.free(out_m[None])[0] else np.array(place_m, dtype=np.float64)
 
-    def _ways_out(self, point: shapely.Geometry) -> list[shapely.LineString]:
+    def _ways_out(self, point: shapely.Geometry) -> list[shapely.Geometry]:
         """Straight ways to every piece of the border of what the place is in, shortest first."""
         import shapely
 
@@ -151,9 +151,9 @@ class Obstacles:
         ends_m = [np.stack([each[:-1], each[1:]], axis=1) for each in corners_m]
         if not ends_m:
             return []
-        pieces = np.atleast_1d(np.asarray(shapely.linestrings(np.concatenate(ends_m))))
-        ways: list[shapely.LineString] = list(shapely.shortest_line(pieces, point))
-        return sorted(ways, key=lambda way: way.length)
+        pieces = np.asarray(shapely.linestrings(np.concatenate(ends_m)))
+        ways = np.asarray(shapely.shortest_line(pieces, point))
+        return list(ways[np.argsort(shapely.length(ways), kind="stable")])
 
     def _enters(self, way: shapely.Geometry, begin: shapely.Geometry) -> bool:
         """Whether ``way`` comes into a shape in which it does not begin."""
