@@ -93,12 +93,6 @@ class FieldTasking(Tasking):
         """The base on whose ground the vehicle is."""
         return self._visits.stands_at
 
-    @property
-    def may_depart_from_bases(self) -> bool:
-        """Whether there are bases from which it may have taken off."""
-        problem = self._flights.problem
-        return problem is not None and problem.n_base > 0
-
     def way_home(self) -> HomeFlight | None:
         """From where the UAV is to the nearest base or its own start; None in a plain mission."""
         name = self._visits.stands_at

@@ -36,6 +36,8 @@ class HomeFlight:
     base: str | None
     """Which base that is; None: its own start."""
     duration_s: float
+    lands: bool = True
+    """It lands there: where there are bases, its own way may lead to one that it took off from."""
 
 
 class Flights(AgentPart):
@@ -118,7 +120,9 @@ class Flights(AgentPart):
             self._home = (
                 None
                 if way is None
-                else HomeFlight(way.via_enu_m, way.end_enu_m, way.base, way.duration_s)
+                else HomeFlight(
+                    way.via_enu_m, way.end_enu_m, way.base, way.duration_s, problem.n_base > 0
+                )
             )
         return self._home
 

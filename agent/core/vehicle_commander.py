@@ -258,8 +258,7 @@ class VehicleCommander(AgentPart):
             self._flew_before,
             home.target_enu_m,
             path_enu_m=home.via_enu_m,
-            # The vehicle's own way leads to where it took off last, which may be a base.
-            land=home.base is not None or self._tasking.may_depart_from_bases,
+            land=home.lands,
         )
 
     def _take_no_further_part(self, now_s: float) -> None:
