@@ -21,7 +21,7 @@ BY_NIGHT = [HUNDRED[place] for place in _LONG]
 BY_DAY = [seed for seed in HUNDRED if seed not in BY_NIGHT]
 BLOCKS = [
     pytest.param(seeds[first : first + BLOCK], marks=marks, id=str(seeds[first]))
-    for seeds, marks in ((BY_DAY, []), (BY_NIGHT, [pytest.mark.slow]))
+    for seeds, marks in ((BY_DAY, ()), (BY_NIGHT, (pytest.mark.slow,)))
     for first in range(0, len(seeds), BLOCK)
 ]
 
