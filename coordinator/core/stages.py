@@ -32,6 +32,7 @@ from coordinator.mission_view.wording import listed
 from coordinator.planner.online import EpochPolicy, Situation, complete_lists, worth_to_go
 from swarm.model import Mission
 from swarm.protocol.board import TaskBoard
+from swarm.protocol.calibration import AS_BRIEFED
 from swarm.protocol.events import Finish, LogLine
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import MissionPhase, PlanEpoch
@@ -409,6 +410,8 @@ class ReplanPolicy:
             "withdrawn": now.withdrawn - before.withdrawn,
         }
         reasons = [f"{listed(sorted(ids), 3)} {what}" for what, ids in changes.items() if ids]
+        if otherwise := _calibrated(before, now):
+            reasons.append(f"{listed(otherwise, 3)} flies otherwise than was known")
         if now.zones != before.zones:
             reasons.append("the operator has changed zones")
         if now.failures > before.failures:
@@ -429,3 +432,15 @@ class ReplanPolicy:
             if task in self._expected_s
         ]
         return float(np.mean(late_s)) / left_s if late_s else 0.0
+
+
+def _calibrated(before: Situation, now: Situation) -> list[str]:
+    """UAVs that have measured that they fly noticeably otherwise than was known."""
+    known, found = dict(before.rates), dict(now.rates)
+    return [
+        uav
+        for uav in sorted(known.keys() | found.keys())
+        for old, new in [(known.get(uav, AS_BRIEFED), found.get(uav, AS_BRIEFED))]
+        if abs(new.time_frac / old.time_frac - 1.0) > DRIFT_FRAC
+        or abs(new.drain_frac / old.drain_frac - 1.0) > DRIFT_FRAC
+    ]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections import Counter, deque
 from collections.abc import Callable, Collection
+from dataclasses import replace
 
 from coordinator.mission_view.fleet_reports import FleetReports
 from coordinator.mission_view.flown_mission import FlownMission
@@ -20,6 +21,7 @@ from coordinator.mission_view.story import EventKind, MissionEvent
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskBoard, TaskState, holders
+from swarm.protocol.calibration import flight_rates
 from swarm.protocol.events import (
     Ask,
     CommonAction,
@@ -234,9 +236,10 @@ class MissionState:
 
     def result(self) -> MissionResult:
         """What has been executed so far."""
-        return self._flown.result(
+        flown = self._flown.result(
             repeated_visits=self._repeated_visits, lost=self.lost, epochs=self._epochs_heard
         )
+        return replace(flown, rates=flight_rates(self.replica))
 
     # -- the story ----------------------------------------------------------------------
 

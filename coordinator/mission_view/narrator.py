@@ -14,14 +14,17 @@ from coordinator.mission_view.story import EventKind, MissionEvent, Story
 from coordinator.mission_view.wording import (
     because,
     choice_in_words,
+    counted,
     entry_in_words,
     listed,
     order_in_words,
+    rates_in_words,
     visit_in_words,
     zone_in_words,
 )
 from swarm.model import Mission
 from swarm.protocol.board import TaskBoard, TaskState
+from swarm.protocol.calibration import FlightRates, is_calibrated
 from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import (
@@ -37,6 +40,7 @@ from swarm.protocol.messages import (
 from swarm.protocol.operator_commands import dispensable, in_force, readiness, zone_edits
 from swarm.protocol.uav_messages import (
     AttemptResult,
+    Calibration,
     Choice,
     Claim,
     ClaimPhase,
@@ -138,6 +142,11 @@ class MissionNarrator:
                 self._hear_claim(message.writer, body, claim, now_s)
             case Outcome():
                 self._hear_outcome(message.writer, body, now_s)
+            case Calibration() if self._is_calibrated:
+                text = f"{message.writer} {rates_in_words(FlightRates.believed(body))}"
+                detail = f", as {counted(body.legs, 'leg')} show"
+                uavs = [message.writer]
+                self.tell(EventKind.CALIBRATED, text, now_s, detail=detail, uavs=uavs)
             case OperatorCommand() if in_force(self._replica).get(body.target) == body:
                 fleet = body.kind is CommandKind.ABORT
                 uavs = self._fleet() if fleet else [body.target]
@@ -316,6 +325,12 @@ class MissionNarrator:
         """Tell who is believed under other keys from now on."""
         text = f"keys revoked or replaced: {listed(sorted(names), NAMES_TOLD)}"
         self.tell(EventKind.NOTE, text, now_s)
+
+    @property
+    def _is_calibrated(self) -> bool:
+        """Whether what UAVs measure counts."""
+        brief = self._replica.brief
+        return brief is not None and is_calibrated(brief)
 
     @property
     def _phase(self) -> MissionPhase:

@@ -11,10 +11,11 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
 
-from coordinator.mission_view.wording import counted, listed, shown_s
+from coordinator.mission_view.wording import counted, listed, rates_in_words, shown_s
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
 from swarm.model import Mission, Plan, TaskId, UavId
+from swarm.protocol.calibration import FlightRates
 from swarm.protocol.uav_messages import AttemptResult, Outcome
 
 
@@ -44,6 +45,8 @@ class MissionResult:
     added: tuple[TaskId, ...] = ()
     """Tasks that the operator has added to the scenario's, whatever became of them."""
     done_by: Mapping[TaskId, UavId] = field(default_factory=dict)
+    rates: Mapping[str, FlightRates] = field(default_factory=dict)
+    """UAVs that flew otherwise than planned, by what they have measured themselves."""
 
     @property
     def is_complete(self) -> bool:
@@ -307,6 +310,10 @@ def deviations(mission: Mission, result: MissionResult) -> list[ReportFact]:
     if popups:
         text = f"{counted(len(popups), 'task')} unknown to the plan"
         found.append(ReportFact("pop-ups", text, popups))
+    if result.rates:
+        text = f"{counted(len(result.rates), 'UAV')} otherwise than planned"
+        how = tuple(f"{uav} {rates_in_words(each)}" for uav, each in sorted(result.rates.items()))
+        found.append(ReportFact("measured", text, how))
     if result.epochs > 1:
         found.append(ReportFact("re-planned", f"{result.epochs} epochs"))
     return found

@@ -35,6 +35,8 @@ class EventKind(StrEnum):
     HOME = "home"
     BASE = "base"
     """A UAV goes to have its battery changed, or is at it."""
+    CALIBRATED = "calibrated"
+    """A UAV has found that it flies otherwise than planned, or as planned again."""
     FREE = "free"
     PAUSED = "paused"
     POSTED = "posted"

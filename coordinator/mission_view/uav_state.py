@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from coordinator.mission_view.mission_state import MissionState
 from swarm.model import BaseId, TaskId, UavId
+from swarm.protocol.calibration import AS_BRIEFED, FlightRates, flight_rates
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, Status, StatusPhase
 
 Point = tuple[float, float, float]
@@ -54,6 +55,8 @@ class UavState:
     velocity_enu_m_s: Point | None
     battery_frac: float | None
     note: str
+    rates: FlightRates
+    """How it flies, by what it has measured."""
     link_age_s: float | None
     """Since it last said something [s of the observer's clock]; None when it never has."""
     silent_s: float | None
@@ -160,6 +163,7 @@ class FleetStates:
     def __init__(self, mission_state: MissionState, now_s: float) -> None:
         brief = mission_state.replica.brief
         self._layers_m = {} if brief is None else {uav.id: uav.layer_m for uav in brief.uavs}
+        self._rates = flight_rates(mission_state.replica)
         self._dropped = mission_state.dropped
         self._mission_s = mission_state.mission_s(now_s)
         self._mission_state = mission_state
@@ -189,6 +193,7 @@ class FleetStates:
             velocity_enu_m_s=None if status is None else status.velocity_enu_m_s,
             battery_frac=None if status is None else status.battery_frac,
             note="" if status is None else status.note,
+            rates=self._rates.get(uav, AS_BRIEFED),
             link_age_s=None if heard_s is None else self._now_s - heard_s,
             silent_s=mission_state.silent_s(uav, self._now_s),
             dropped=self._dropped.get(uav, {}),

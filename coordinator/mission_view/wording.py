@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from swarm.model import TaskId
 from swarm.model.ids import FLEET
 from swarm.protocol.board import claim_strength
+from swarm.protocol.calibration import AS_BRIEFED, FlightRates
 from swarm.protocol.field_messages import ZoneEdit
 from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEdit, TaskEntry
 from swarm.protocol.operator_commands import describe_command
@@ -128,6 +129,18 @@ def visit_in_words(claim: Claim, before: Claim | None) -> str | None:
     if before is not None and (before.base, before.stage) == (claim.base, claim.stage):
         return None
     return _VISITED[claim.stage].format(claim.base)
+
+
+def rates_in_words(rates: FlightRates) -> str:
+    """How a UAV flies, by what was measured, beside what the mission says of it."""
+    if rates == AS_BRIEFED:
+        return "flies as planned again"
+    parts = []
+    if rates.time_frac != 1.0:
+        parts.append(f"takes {rates.time_frac:g} times as long as planned")
+    if rates.drain_frac != 1.0:
+        parts.append(f"drains its battery {rates.drain_frac:g} times as fast")
+    return " and ".join(parts)
 
 
 def seconds_in_words(time_s: float) -> str:

@@ -31,6 +31,7 @@ from swarm.protocol.board import (
     ranks,
     rule_of,
 )
+from swarm.protocol.calibration import FlightRates
 from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import PlanEpoch
 from swarm.protocol.operator_commands import zones_in_force
@@ -69,6 +70,8 @@ class Situation:
     field: FieldStanding | None = None
     """The same under the field's constraints; None where there are none. ``state`` knows nothing
     of these: it tells who is where, and what is open."""
+    rates: tuple[tuple[str, FlightRates], ...] = ()
+    """UAVs that fly otherwise than the brief says, and how they do."""
 
     @classmethod
     def of(cls, board: TaskBoard, credible: Collection[str], mission_s: float) -> Situation | None:
@@ -111,6 +114,7 @@ class Situation:
             None
             if in_field is None
             else FieldStanding.of(in_field, board, claims, under_way, taking_part, mission_s),
+            tuple(sorted(board.rates.items())),
         )
 
     @property

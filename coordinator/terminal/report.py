@@ -6,7 +6,7 @@ import json
 import math
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -118,6 +118,8 @@ class MissionReport:
             "lost_because": dict(self.lost_because),
             "value": self.value,
         }
+        if result.rates:
+            flown["calibration"] = {uav: asdict(rates) for uav, rates in result.rates.items()}
         planned = _no_plan(self.mission) if self.plan is None else plan_as_json(self.plan)
         found: dict[str, object] = _finite({**planned, **flown})
         return found

@@ -18,11 +18,13 @@ from coordinator.mission_view.wording import (
     counted,
     left_out_in_words,
     listed,
+    rates_in_words,
     shown_value,
     zone_said,
 )
 from coordinator.terminal.live_view import mission_title, task_counts
 from swarm.protocol.board import TaskState
+from swarm.protocol.calibration import AS_BRIEFED
 
 _MOST_LEFT_OUT = 8
 """Tasks named that are left out."""
@@ -78,6 +80,8 @@ def _uav_as_json(uav: UavView) -> dict[str, Any]:
         "sortie_left_s": uav.sortie_left_s,
         "swaps": uav.swaps,
         "link_age_s": uav.link_age_s,
+        "time_frac": uav.rates.time_frac,
+        "drain_frac": uav.rates.drain_frac,
         "note": uav.note,
         "dropped": dict(uav.dropped),
     }
@@ -106,6 +110,9 @@ def status_table(scene: Scene, width: int, signs: Signs) -> RenderableType:
         facts.add_row("operator", _line(command_in_words(command), signs))
     for edit in scene.zone_edits:
         facts.add_row("operator", _line(zone_said(edit), signs))
+    for uav in scene.uavs:
+        if uav.rates != AS_BRIEFED:
+            facts.add_row("measured", _line(f"{uav.id} {rates_in_words(uav.rates)}", signs))
     parts: list[RenderableType] = [mission_title(scene, width, 1.0, signs), facts, ""]
     parts.append(_fleet(scene, signs))
     if scene.dropped_by_reason:
