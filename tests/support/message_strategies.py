@@ -24,6 +24,7 @@ from swarm.protocol.uav_messages import (
     MAX_CANDIDATES,
     AttemptResult,
     BaseStage,
+    Calibration,
     Candidate,
     Choice,
     ChoiceBasis,
@@ -248,8 +249,9 @@ task_orders = _of_tasks(TaskEdit)
 starts = st.builds(StartWithout, uav_ids, counts, notes)
 zone_edits = st.builds(ZoneEdit, zones, st.booleans(), counts, notes)
 readies = st.builds(UavReady, uav_ids, counts, notes)
+calibrations = st.builds(Calibration, st.floats(1e-3, 1e3), st.floats(1e-3, 1e3), counts)
 by_coordinator = briefs | epochs | boards
-by_uav = claims | outcomes | statuses | choices
+by_uav = claims | outcomes | calibrations | statuses | choices
 by_operator = commands | task_orders | starts | zone_edits | readies
 
 
@@ -262,7 +264,7 @@ def messages(
         stamped: their stamps.
         all_kinds: also what is no register.
     """
-    said = by_uav if all_kinds else claims | outcomes
+    said = by_uav if all_kinds else claims | outcomes | calibrations
     return st.one_of(
         st.builds(Message, st.just(MISSION), st.just(COORDINATOR), stamped, by_coordinator),
         st.builds(Message, st.just(MISSION), uav_ids, stamped, said),

@@ -1,0 +1,96 @@
+"""How measurements of a UAV's flight become what is told of it."""
+
+from __future__ import annotations
+
+import math
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from agent.core.calibration import STEP_FRAC, RunningMedian, told_anew
+from agent.core.energy import SortieClock
+from swarm.protocol.calibration import TIME_FRAC_RANGE
+from swarm.protocol.messages import UavSpec
+
+shares = st.floats(0.1, 10.0)
+ME = UavSpec("u0", (0.0, 0.0, 0.0), 10.0, {}, {}, None, 0.0, endurance_s=100.0, reserve_frac=0.2)
+
+
+def estimate(votes: list[float], known: float = 1.0) -> float:
+    running = RunningMedian(known)
+    for vote in votes:
+        running.add(vote)
+    return running.value
+
+
+@given(st.lists(shares, max_size=30), shares)
+def test_estimates_lie_among_what_was_measured_and_what_was_known(
+    votes: list[float], known: float
+) -> None:
+    assert min([known, *votes]) <= estimate(votes, known) <= max([known, *votes])
+
+
+@given(shares, st.integers(0, 20), st.integers(0, 20))
+def test_one_odd_leg_changes_nothing(odd: float, before: int, after: int) -> None:
+    assert estimate([1.0] * before + [odd] + [1.0] * after) == 1.0
+
+
+@given(shares)
+def test_few_legs_change_little_and_some_more_all(true: float) -> None:
+    assert estimate([]) == estimate([true]) == 1.0
+    assert estimate([true, true]) == (1.0 + true) / 2.0
+    assert estimate([true] * 3) == estimate([true] * 20) == true
+
+
+@given(shares, shares)
+def test_what_was_measured_long_ago_is_forgotten(old: float, new: float) -> None:
+    assert estimate([old] * 30 + [new] * 5) == new
+
+
+@given(st.floats(0.5, 3.0), shares)
+def test_what_is_told_moves_in_steps_within_what_is_believable(told: float, found: float) -> None:
+    low, high = TIME_FRAC_RANGE
+    now = told_anew(told, found, TIME_FRAC_RANGE)
+
+    assert low <= now <= high
+    if abs(found / told - 1.0) < STEP_FRAC:
+        assert now == told
+    assert told_anew(now, found, TIME_FRAC_RANGE) == now  # nothing flutters
+
+
+@given(st.floats(-1e-9, 1e-9))
+def test_rounding_is_no_news(error: float) -> None:
+    assert told_anew(1.0, 1.0 + error, TIME_FRAC_RANGE) == 1.0
+
+
+def test_votes_of_this_life_are_told_from_what_was_known() -> None:
+    running = RunningMedian(1.0)
+    assert running.measured is None
+    running.add(1.3)
+    assert running.measured == 1.3
+    for _ in range(20):
+        running.add(1.2)
+    assert running.measured == running.value == 1.2
+
+
+def test_a_sortie_ends_by_how_fast_the_battery_drains() -> None:
+    sortie = SortieClock()
+    sortie.heed(1.25, 0.0)
+    sortie.begin(ME, 0.0)
+    assert sortie.end_s == 80.0 / 1.25
+    # What is left: so much that it would last until 50 s, were it not for the drain.
+    assert sortie.measure(ME, 0.5, 20.0)
+    assert sortie.end_s == 20.0 + 30.0 / 1.25
+
+    sortie.depart(ME, 100.0)
+    assert sortie.end_s == 100.0 + 80.0 / 1.25
+    sortie.heed(1.0, 140.0)  # 24 s of 64 s are left, worth 30 s
+    assert math.isclose(sortie.end_s, 170.0)
+
+
+def test_a_sortie_that_drains_as_planned_is_as_it_was() -> None:
+    sortie, plain = SortieClock(), SortieClock()
+    for each in (sortie, plain):
+        each.begin(ME, 3.1)
+    sortie.heed(1.0, 7.7)
+    assert sortie.end_s == plain.end_s

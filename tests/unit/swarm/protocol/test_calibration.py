@@ -1,0 +1,148 @@
+"""What UAVs tell of how they fly, and what boards make of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId
+from swarm.model.ids import COORDINATOR
+from swarm.protocol.board import TaskBoard
+from swarm.protocol.calibration import FlightRates, flight_rates
+from swarm.protocol.codec import Codec
+from swarm.protocol.encoding import encode
+from swarm.protocol.messages import Body
+from swarm.protocol.registers import Replica
+from swarm.protocol.uav_messages import Calibration
+from tests.support.builders import MISSION, message
+from tests.support.field_registers import brief_of, entries_of
+
+FLIGHT = Mission(
+    "flight",
+    1000.0,
+    (
+        Uav(UavId("u0"), (0.0, 0.0, 0.0), 10.0, acceleration_m_s2=2.0),
+        Uav(UavId("u1"), (0.0, 10.0, 0.0), 10.0, acceleration_m_s2=2.0),
+    ),
+    (
+        Task(TaskId("near"), (20.0, 0.0, 0.0), 1.0),
+        Task(TaskId("far"), (900.0, 0.0, 0.0), 1.0),
+    ),
+)
+IN_FIELD = replace(
+    FLIGHT,
+    uavs=tuple(replace(uav, endurance_s=300.0) for uav in FLIGHT.uavs),
+    bases=(Base(BaseId("b0"), (500.0, 0.0, 0.0), 30.0, 1),),
+)
+PLAIN = replace(FLIGHT, uavs=tuple(replace(uav, acceleration_m_s2=None) for uav in FLIGHT.uavs))
+
+
+class Board:
+    def __init__(self, mission: Mission) -> None:
+        self.replica, self._said = Replica(), 0
+        self.board = TaskBoard(self.replica, MISSION)
+        for body in (brief_of(mission), *entries_of(mission)):
+            self.say(COORDINATOR, body)
+
+    def say(self, writer: str, body: Body) -> None:
+        self._said += 1
+        self.replica.join(message(writer, body, self._said))
+
+
+def test_times_of_one_uav_follow_where_speeds_change_in_time_alone() -> None:
+    told = Board(FLIGHT)
+    before = told.board.problem
+    told.say("u1", Calibration(1.25, 1.0, 4))
+    after = told.board.problem
+
+    assert before is not None
+    assert after is not None
+    assert told.board.field_problem is None
+    here = np.zeros(3)
+    np.testing.assert_array_equal(after.travel_s(0, here), before.travel_s(0, here))
+    np.testing.assert_allclose(after.travel_s(1, here), 1.25 * before.travel_s(1, here), 1e-12)
+
+
+def test_legs_and_batteries_follow_in_the_field() -> None:
+    told = Board(IN_FIELD)
+    before = told.board.field_problem
+    told.say("u1", Calibration(1.25, 1.5, 4))
+    after = told.board.field_problem
+
+    assert before is not None
+    assert after is not None
+    for uav, frac in ((0, 1.0), (1, 1.25)):
+        old, new = before.leg_s[before.kind[uav]], after.leg_s[after.kind[uav]]
+        np.testing.assert_array_equal(new, old * frac)
+        np.testing.assert_array_equal(after.home_s[uav], before.home_s[uav] * frac)
+        here = after.legs_from_s(uav, (3.0, 4.0, 0.0))
+        np.testing.assert_array_equal(here, before.legs_from_s(uav, (3.0, 4.0, 0.0)) * frac)
+    np.testing.assert_array_equal(after.full_s, before.full_s / [1.0, 1.5])
+    np.testing.assert_array_equal(after.first_s, before.first_s / [1.0, 1.5])
+
+
+@pytest.mark.parametrize("mission", [FLIGHT, IN_FIELD])
+def test_who_flies_as_planned_changes_nothing(mission: Mission) -> None:
+    told = Board(mission)
+    told.say("u0", Calibration(1.0, 1.0, 9))
+    fresh = Board(mission)
+
+    assert flight_rates(told.replica) == {}
+    known, same = told.board.field_problem, fresh.board.field_problem
+    if known is not None and same is not None:
+        np.testing.assert_array_equal(known.leg_s, same.leg_s)
+        np.testing.assert_array_equal(known.full_s, same.full_s)
+    plain, plain_too = told.board.problem, fresh.board.problem
+    assert plain is not None
+    assert plain_too is not None
+    np.testing.assert_array_equal(plain.travel_between_s(0), plain_too.travel_between_s(0))
+
+
+def test_problems_are_made_anew_when_somebody_flies_otherwise_and_only_then() -> None:
+    told = Board(IN_FIELD)
+    first = told.board.field_problem
+    assert told.board.field_problem is first
+    told.say("u0", Calibration(1.1, 1.0, 3))
+    second = told.board.field_problem
+    told.say("u0", Calibration(1.1, 1.0, 8))  # rests on more, and says the same
+    assert second is not first
+    assert told.board.field_problem is second
+
+
+def test_without_the_keys_of_the_field_nothing_counts() -> None:
+    told = Board(PLAIN)
+    before = told.board.problem
+    told.say("u0", Calibration(2.0, 2.0, 9))
+    after = told.board.problem
+
+    assert flight_rates(told.replica) == {}
+    assert before is not None
+    assert after is not None
+    np.testing.assert_array_equal(after.speed_m_s, before.speed_m_s)
+
+
+def test_unbelievable_words_are_clamped_and_concern_their_writer_alone() -> None:
+    told = Board(IN_FIELD)
+    told.say("u0", Calibration(1e3, 1e-3, 1))
+    told.say("stranger", Calibration(2.0, 2.0, 1))
+
+    assert flight_rates(told.replica) == {"u0": FlightRates(3.0, 0.8)}
+
+
+def test_only_the_uav_itself_tells_how_it_flies() -> None:
+    said = message("u0", Calibration(1.2, 1.1, 5))
+    codec = Codec(MISSION)
+
+    assert codec.decode(said.key, encode(said)) == said
+    for other in ("u1", COORDINATOR):
+        assert codec.decode(said.key, encode(replace(said, writer=other))) is None
+
+
+@pytest.mark.parametrize("number", [0.0, -1.0, 1e9])
+def test_numbers_that_nobody_could_mean_are_dropped(number: float) -> None:
+    codec = Codec(MISSION)
+    said = message("u0", Calibration(number, 1.0, 5))
+    assert codec.decode(said.key, encode(said)) is None
+    assert codec.dropped == {"malformed": 1}
