@@ -56,6 +56,10 @@ class UncertaintyOptions(TypedDict, total=False):
     """Whether attempts succeed or fail by chance; otherwise each is worth its p."""
     survival: bool
     """Whether tasks cost UAVs by chance; otherwise later tasks are worth their S."""
+    speed_frac: float
+    """Share of its cruise speed at which every UAV really flies."""
+    drain_frac: float
+    """How many times as fast as they should batteries really drain."""
     speed_sd_frac: float
     """Standard deviation of a UAV's speed, as a share of its cruise speed."""
     leg_sd_frac: float

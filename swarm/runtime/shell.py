@@ -367,8 +367,9 @@ def join_mission(
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
     Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
-    ``operator/*``, ``operator/task/*``, ``operator/start/*``, ``operator/zone/*`` and
-    ``operator/ready/*``, where there are keys ``roster``, watches ``alive/*``.
+    ``uav/*/calibration``, ``operator/*``, ``operator/task/*``, ``operator/start/*``,
+    ``operator/zone/*`` and ``operator/ready/*``, where there are keys ``roster``, watches
+    ``alive/*``.
 
     Args:
         bus: an open bus.
