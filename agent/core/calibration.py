@@ -7,13 +7,14 @@ one that began on the ground: take-off is no part of the prediction. **The drain
 
 Each is a share of the prediction by the brief, and has one vote among the last `_WINDOW` in a
 running median, which begins with `_PRIOR` votes for what is known already. So one leg or two change
-little, an odd one nothing, and after four the estimate is what was measured. What is told of it in
+little, an odd one nothing, and after four the estimate is what was measured. Votes that
+nobody would believe are none. What is told of it in
 the own register moves in steps of `STEP_FRAC` or more, so that neither decisions nor problems
 change with each leg. A later life begins with what the register says.
 
 Only the own battery is watched with more caution: where the votes without those for what is known
 say worse than what is told, its sortie ends by them (`FlightMeter.cautious_drain_frac`), so that a
-UAV that finds itself slow on its first leg turns home in time.
+UAV that finds itself slow on its first two legs turns home in time.
 
 Leaves out: what follows (swarm.protocol.calibration, and agent.core.field_tasking for the battery).
 """
@@ -113,7 +114,8 @@ class FlightMeter(AgentPart):
         if self._known is None or not self._counts:
             return told.drain_frac
         times, drains = self._known
-        longer = _worse(told.time_frac, times.measured, TIME_FRAC_RANGE) / told.time_frac
+        slow = times.measured if times.count > 1 else None  # one leg may be odd
+        longer = _worse(told.time_frac, slow, TIME_FRAC_RANGE) / told.time_frac
         return longer * _worse(told.drain_frac, drains.measured, DRAIN_FRAC_RANGE)
 
     @property
@@ -202,6 +204,9 @@ class FlightMeter(AgentPart):
         return self._known
 
     def _vote(self, which: int, vote: float, now_s: float) -> bool:
+        within = (TIME_FRAC_RANGE, DRAIN_FRAC_RANGE)[which]
+        if not 0.5 * within[0] <= vote <= within[1]:  # held up, or no measurement at all
+            return False
         before = self.rates, self.cautious_drain_frac
         self._medians[which].add(vote)
         self._tell()
