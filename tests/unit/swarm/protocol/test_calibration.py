@@ -43,8 +43,9 @@ class Board:
     def __init__(self, mission: Mission) -> None:
         self.replica, self._said = Replica(), 0
         self.board = TaskBoard(self.replica, MISSION)
-        for body in (brief_of(mission), *entries_of(mission)):
-            self.say(COORDINATOR, body)
+        self.say(COORDINATOR, brief_of(mission))
+        for entry in entries_of(mission):
+            self.say(COORDINATOR, entry)
 
     def say(self, writer: str, body: Body) -> None:
         self._said += 1
