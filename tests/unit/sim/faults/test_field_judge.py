@@ -228,7 +228,7 @@ def test_who_is_in_a_zone_has_as_long_as_its_shortest_way_out_takes(
     out_s: float, uav: dict[str, Any], slowed: dict[str, float], is_sound: bool
 ) -> None:
     world = on_a_way((0.0, 100.0, 0.0), (25.0, 100.0, 0.0), (25.0 + out_s, 110.01, 0.0))
-    me = replace(MISSION.uavs[0], **uav)  # type: ignore[arg-type]
+    me = replace(MISSION.uavs[0], **uav)
     world.mission = replace(MISSION, uavs=(me,), wind_enu_m_s=(0.0, 3.0))
     complaints = FieldJudge(world, slowed=slowed).complaints([DRAWN])
 
