@@ -198,7 +198,7 @@ def make_plan(
     if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
     if not PLAIN_CONSTRAINTS.issuperset(mission.constraints):
-        # Only here: all that the field needs would let plans of plain missions begin later.
+        # Here: all that the field needs would let plans of plain missions begin later.
         from coordinator.planner.field_plan import FieldRequest, make_field_plan
 
         limits = (seed, stop, progress, bound_s, bound_frac, threads, modest)
@@ -212,10 +212,8 @@ def make_plan(
     search_ends = part_of(ends, 1.0 - bound_frac) if keeps else ends
     routes, sequence, evaluations = search.lists(proven, search_ends)
     objective, completion_s = evaluate(problem, routes)
-    bound: float | None = None
-    if proven is None and bound_s is not None:
-        bound_ends = first_of(after_time(clock, bound_s), ends)
-        bound = upper_bound(problem, routes, bound_ends, threads=threads).objective
+    bound_ends = None if bound_s is None else first_of(after_time(clock, bound_s), ends)
+    bound = search.bound(routes, bound_ends) if proven is None else None
     plan = Plan(
         scenario=mission.name,
         method=method if isinstance(method, str) else method.name,
@@ -259,6 +257,12 @@ class _PlanRequest:
                 return None
             ends = part_of(ends, _PROOF_FRAC)
         return optimum_before(self.problem, lambda: ends(0.0), threads=self.threads)
+
+    def bound(self, routes: Sequence[Sequence[int]], ends: ShouldStop | None) -> float | None:
+        """The least bound on J that is found before `ends`; `routes` are known already."""
+        if ends is None:
+            return None
+        return upper_bound(self.problem, routes, ends, threads=self.threads).objective
 
     def lists(
         self, proven: Optimum | None, ends: ShouldStop

@@ -35,6 +35,8 @@ class Quantity:
     """``%`` is shown for shares of 1."""
     words: str
     """A clause with the number, in that unit, in place of ``{}``."""
+    idle: float = 0.0
+    """The number that changes nothing."""
 
     @property
     def label(self) -> str:
@@ -57,6 +59,12 @@ QUANTITIES = {
     ),
     "popups_per_min": Quantity("further pop-ups", "per min", "{} further tasks pop up per minute"),
     "withdrawals_per_min": Quantity("withdrawals", "per min", "{} tasks are withdrawn per minute"),
+    "speed_frac": Quantity(
+        "UAVs' speeds", "% of cruise speed", "UAVs fly at {} % of their cruise speed", 1.0
+    ),
+    "drain_frac": Quantity(
+        "drain of batteries", "% of the planned", "batteries drain at {} % of the planned rate", 1.0
+    ),
     "speed_sd_frac": Quantity(
         "spread of UAVs' speeds", "% of cruise speed", "UAVs' speeds spread by {} %"
     ),
@@ -113,7 +121,7 @@ def uncertainty_words(uncertainty: Uncertainty) -> str:
         value = getattr(uncertainty, name)
         if name == "partition_s" and uncertainty.partitions_per_min == 0.0:
             continue  # a default without effect
-        if value > 0.0:
+        if value != quantity.idle:
             clauses.append(quantity.words.format(f"{quantity.shown(value):g}"))
     if uncertainty.outcomes:
         clauses.append("attempts succeed and fail by chance")
