@@ -15,7 +15,7 @@ from coordinator.planner.field_bound import field_bound
 from coordinator.planner.field_exact import FieldPlanLists, estimated_field_s, field_optimum_before
 from coordinator.planner.field_guided import field_guided_plan
 from coordinator.planner.field_schedule import left_out, schedule_of
-from coordinator.planner.field_sequence import search_field_sequence
+from coordinator.planner.field_sequence import search_field_sequence, worth_of
 from coordinator.planner.options import (
     Limit,
     ShouldStop,
@@ -31,7 +31,7 @@ from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.network import TooManyLegsError
 from swarm.allocation.field.problem import FloatArray
 from swarm.allocation.field.rules import FIELD_RULES
-from swarm.kernels.field import FlownLists, fly_lists
+from swarm.kernels.field import FIELD_GREEDY, FlownLists, fly_lists, run_rule
 from swarm.model import Mission, Plan, TaskId
 from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.runtime.clock import Clock
@@ -82,6 +82,8 @@ def make_field_plan(asked: FieldRequest) -> Plan:
     optimum = search.optimum()
     keeps = optimum is None and asked.bound_s is not None and asked.bound_frac > 0.0
     found = search.lists(optimum, part_of(ends, 1.0 - asked.bound_frac) if keeps else ends)
+    if asked.stop is not None:  # which may have been before anything was found
+        found = search.at_least_greedy(found)
     flown = fly_lists(problem.kernel, FieldState.at_start(problem, found.sequence), found.lists)
     plan = replace(
         _described(asked.mission.name, method, problem, found, flown),
@@ -174,6 +176,17 @@ class _FieldSearch:
         if optimum is None:
             return self._guided(after_evaluations(_KNOWN_ITERATIONS))
         return _FieldLists(optimum.lists, tuple(range(self.problem.n_uav)), 0)
+
+    def at_least_greedy(self, found: _FieldLists) -> _FieldLists:
+        """What was found, or the greedy decisions in the mission's order where they are better."""
+        greedy = run_rule(self.problem.kernel, FieldState.at_start(self.problem), FIELD_GREEDY)
+        lists = tuple(tuple(items) for items in greedy.lists(self.problem.n_uav))
+        instead = replace(found, lists=lists, sequence=tuple(range(self.problem.n_uav)))
+        return max(found, instead, key=self._worth)
+
+    def _worth(self, found: _FieldLists) -> tuple[float, float]:
+        state = FieldState.at_start(self.problem, found.sequence)
+        return worth_of(self.problem, state, found.lists)
 
     def _guided(self, stop: ShouldStop | None) -> _FieldLists:
         made = field_guided_plan(

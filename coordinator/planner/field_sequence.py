@@ -80,6 +80,16 @@ def search_field_sequence(
     return search.best
 
 
+def worth_of(
+    problem: FieldProblem, state: FieldState, lists: Sequence[Sequence[int]]
+) -> tuple[float, float]:
+    """(Required tasks that ``lists`` leave out, below 0, and J): how plans compare."""
+    done = [item >> 1 for items in lists for item in items if item >= 0]
+    left_out = int(problem.required.sum() - problem.required[done].sum())
+    flown = fly_lists(problem.kernel, state, lists)
+    return -float(left_out), float(flown.value.sum())
+
+
 class _Enough(Exception):  # noqa: N818 - nothing is wrong
     """The search is to end with what it has."""
 
@@ -120,7 +130,7 @@ class _SequenceClimb:
         whole = not self._should_stop(0.0)
         if whole or not spent:
             lists = runs.lists(self._problem.n_uav)
-            value = self._worth(state, lists)
+            value = worth_of(self._problem, state, lists)
             best = self.best
             if value > self._best_value:
                 self._best_value = value
@@ -154,9 +164,3 @@ class _SequenceClimb:
     ) -> tuple[int, ...] | None:
         value = self.value_of(order)
         return next((near for near in neighbours(order, rng) if self.value_of(near) > value), None)
-
-    def _worth(self, state: FieldState, lists: Sequence[Sequence[int]]) -> tuple[float, float]:
-        done = [item >> 1 for items in lists for item in items if item >= 0]
-        left_out = int(self._problem.required.sum() - self._problem.required[done].sum())
-        flown = fly_lists(self._problem.kernel, state, lists)
-        return -float(left_out), float(flown.value.sum())

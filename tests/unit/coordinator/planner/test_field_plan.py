@@ -13,10 +13,13 @@ from coordinator.planner.field_plan import FIELD_METHODS
 from coordinator.planner.options import after_evaluations
 from coordinator.planner.plan import make_plan
 from coordinator.planner.plan_report import plan_as_json, plan_from_json
+from swarm.allocation.field import FieldProblem, FieldState
+from swarm.kernels.field import FIELD_GREEDY, run_rule
 from swarm.model import Mission, TaskId
 from swarm.model.plan import LeftOut
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import InputError
+from swarm.scenario import load_scenario, resolve_scenario
 from tests.support import field_missions
 from tests.support.field_oracle import brute, checker, scenario
 from tests.support.field_oracle.flight import FlightTimes
@@ -109,6 +112,20 @@ def test_the_same_seed_gives_the_same_plan() -> None:
     for method in FIELD_METHODS:
         one, other = (told(mission, method, seed=4) for _ in range(2))
         assert {**one, "elapsed_s": 0} == {**other, "elapsed_s": 0}
+
+
+@pytest.mark.parametrize("method", ["greedy", "lookahead", "guided"])
+def test_a_plan_that_is_stopped_at_once_is_no_worse_than_greedy_decisions(method: str) -> None:
+    mission = load_scenario(resolve_scenario("reservoir-inspection"))
+    clock = SystemClock()
+    stopped = make_plan(mission, method, clock=clock, stop=lambda _: True)
+
+    problem = FieldProblem.from_mission(mission)
+    decided = run_rule(problem.kernel, FieldState.at_start(problem), FIELD_GREEDY)
+    greedy = [len([item for item in items if item >= 0]) for items in decided.lists(3)]
+    assert sum(greedy) >= 8
+    assert [len(route) for route in stopped.routes.values()] == greedy
+    assert stopped.evaluations == 0
 
 
 def test_methods_that_heed_nothing_of_the_field_say_so() -> None:
