@@ -212,8 +212,20 @@ class RecordingRule:
         return found or ((decision.task, decision.score),)
 
 
-class TaskDecision(Protocol):
-    """What a choice tells of a decision, whatever it was made by."""
+class FieldDecision(Protocol):
+    """What a choice tells of a decision under constraints."""
+
+    @property
+    def task(self) -> str | None:
+        """The task it takes; None: it flies to a base."""
+
+    @property
+    def base(self) -> str | None:
+        """The base it flies to; None: it takes a task."""
+
+    @property
+    def end_s(self) -> float:
+        """When the task is done, or the UAV ready at the base [s mission time]."""
 
     @property
     def score(self) -> float | None:
@@ -281,30 +293,32 @@ class ChoiceReporter(AgentPart):
         self,
         turn: DecisionTurn,
         epoch: PlanEpoch,
-        decision: TaskDecision,
-        claim: Claim,
-        left: str | None,
+        decision: FieldDecision,
+        rank: int,
+        left: str | None = None,
     ) -> PublishLast:
-        """The same of a task chosen under the field's constraints."""
+        """The same of a task or a base chosen under the field's constraints."""
         self._number += 1
         head, before = self._replica.heads.get(self._uav), self._announcer.claimed
-        number, task, score = self._number, str(claim.task), decision.score or 0.0
+        number, score = self._number, decision.score or 0.0
+        candidates = () if decision.task is None else (Candidate(decision.task, score),)
 
         def make() -> Message:
             choice = Choice(
                 number=number,
-                task=task,
+                task=decision.task,
                 left=left,
                 chosen_s=turn.now_s,
                 epoch=epoch.number,
                 rule=epoch.rule,
-                rank=claim.rank,
+                rank=rank,
                 score=score,
                 second_score=decision.second_score,
                 certificate=False,
-                completion_s=claim.completion_s,
-                candidates=(Candidate(task, score),),
+                completion_s=decision.end_s,
+                candidates=candidates,
                 basis=self._basis(turn, head, before),
+                base=decision.base,
             )
             return self._announcer.say(choice).message
 

@@ -32,7 +32,6 @@ from agent.core.states import (
 )
 from agent.core.tasking import Tasking
 from agent.core.time_limits import WITHOUT_AIM, TimeLimits, ends_of
-from swarm.allocation.field import FieldProblem
 from swarm.allocation.field.ways import Way
 from swarm.protocol.board import RuleMaker, ranks, rule_of
 from swarm.protocol.messages import PlanEpoch, TaskEntry
@@ -191,14 +190,16 @@ class FieldTasking(Tasking):
         if decision is None or decision.base in self._refused_bases.left_alone(now_s):
             self._stay_idle(now_s)
         elif decision.task is not None:
-            self._take_task(problem, epoch, turn, decision, now_s)
+            self._take_task(epoch, turn, decision, now_s)
         elif decision.base is not None:
             haven = self._havens.reach(decision.base, now_s)
             if haven is None:
                 self._stay_idle(now_s)
             else:
+                told = self._choices.made_in_field(turn, epoch, decision, self._rank)
                 arrives_s, ready_s = decision.arrive_s, decision.end_s
                 self._visit_base(replace(haven, arrives_s=arrives_s, ready_s=ready_s), now_s)
+                self._actions.append(told)
 
     def _divert_in_field(self, now_s: float) -> None:
         problem, epoch, claim = self._flights.problem, self._replica.epoch, self.claim
@@ -211,7 +212,7 @@ class FieldTasking(Tasking):
         decision = divert_in_field(problem, self._mission_view.board, rule, turn)
         if decision is not None and decision.task is not None:
             self._become_free(turn.now_s)
-            self._take_task(problem, epoch, turn, decision, now_s, left=claim.task)
+            self._take_task(epoch, turn, decision, now_s, left=claim.task)
 
     def _field_turn(self, free_since_s: float, now_s: float) -> DecisionTurn | None:
         turn = self._turn(free_since_s, now_s)
@@ -236,7 +237,6 @@ class FieldTasking(Tasking):
 
     def _take_task(
         self,
-        problem: FieldProblem,
         epoch: PlanEpoch,
         turn: DecisionTurn,
         decision: FieldTurnDecision,
@@ -244,7 +244,6 @@ class FieldTasking(Tasking):
         left: str | None = None,
     ) -> None:
         task = self._replica.board[str(decision.task)]
-        rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
         standing = self._visits.claim if self._visits.stands_at is not None else None
         self._machine.take(Trigger.DECIDED if left is None else Trigger.DIVERTED)
         self._free.retry_at_s, self._free.adrift, self._diversion_due = None, False, False
@@ -254,12 +253,12 @@ class FieldTasking(Tasking):
             ClaimPhase.PROPOSED,
             task.task,
             self._free.since_s,
-            rank,
+            self._rank,
             decision.end_s,
             sortie_end_s=None if math.isinf(ends_s) else ends_s,
             reversed=decision.reversed if task.path_enu_m else None,
         )
-        told = self._choices.made_in_field(turn, epoch, decision, claim, left)
+        told = self._choices.made_in_field(turn, epoch, decision, self._rank, left)
         if left is not None:
             turns: dict[str, object] = {"task": left, "for": task.task}
             self._log("turns aside", **turns, **self._choices.label)
@@ -279,14 +278,12 @@ class FieldTasking(Tasking):
 
     def _visit_base(self, haven: Haven, now_s: float) -> None:
         """Fly there and claim a slot; being free, or having just become it."""
-        problem, epoch, since_s = self._flights.problem, self._replica.epoch, self._free.since_s
-        sequence = () if epoch is None else epoch.sequence
-        rank = 0 if problem is None else ranks(sequence, problem.uav_ids)[self._uav]
+        since_s = self._free.since_s
         self._leave_ground(now_s)
         self._become_free(since_s)
         self._free.to_decide = False
         times_s = haven.arrives_s, haven.ready_s
-        self._visits.set_off(haven.way, haven.base.id, since_s, rank, *times_s, now_s)
+        self._visits.set_off(haven.way, haven.base.id, since_s, self._rank, *times_s, now_s)
 
     def _visit_over(self, since_s: float, adrift: bool) -> None:
         self._become_free(since_s, adrift=adrift)
@@ -488,6 +485,13 @@ class FieldTasking(Tasking):
         return "its battery is about to be used up"
 
     # -- pieces ----------------------------------------------------------------------------------
+
+    @property
+    def _rank(self) -> int:
+        """Its place in the sequence in force, from 0."""
+        problem, epoch = self._flights.problem, self._replica.epoch
+        sequence = () if epoch is None else epoch.sequence
+        return 0 if problem is None else ranks(sequence, problem.uav_ids)[self._uav]
 
     @property
     def _in_field(self) -> bool:

@@ -19,7 +19,7 @@ from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import Progress, progress_of
 from coordinator.mission_view.scene import TAKEN, task_stands
 from coordinator.mission_view.uav_state import LOST, FleetStates, UavState
-from coordinator.mission_view.wording import clean, short_names
+from coordinator.mission_view.wording import clean, short_names, visit_reason_in_words
 from swarm.allocation.problem import Problem
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskState
@@ -416,6 +416,8 @@ def _choice_row(n: int, uav: str, choice: Choice) -> dict[str, object]:
         "id": f"{uav}-{choice.number}",
         "uav": uav,
         "task": choice.task,
+        "base": choice.base,
+        "why": visit_reason_in_words(choice),
         "left": choice.left,
         "mission_s": _rounded(choice.chosen_s, 3),
         "rule": choice.rule,

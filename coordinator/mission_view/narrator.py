@@ -16,6 +16,7 @@ from coordinator.mission_view.wording import (
     choice_in_words,
     counted,
     entry_in_words,
+    goal_in_words,
     listed,
     order_in_words,
     rates_in_words,
@@ -268,11 +269,12 @@ class MissionNarrator:
 
     def choice(self, uav: str, choice: Choice, now_s: float) -> None:
         """Tell that a UAV turns aside; where reasons are wanted, of every choice."""
-        task, left, reasons = choice.task, choice.left, self._reasons
+        left, reasons = choice.left, self._reasons
         if left is None and reasons is None:
             return
-        text = f"{uav} chose {task}" if left is None else f"{uav} turns aside from {left} to {task}"
-        tasks = {task} if left is None else {task, left}
+        went = goal_in_words(choice)
+        text = f"{uav} chose {went}" if left is None else f"{uav} turns aside from {left} to {went}"
+        tasks = {task for task in (choice.task, left) if task is not None}
         detail = "" if reasons is None else choice_in_words(choice)
         self.tell(EventKind.CHOSEN, text, now_s, detail=detail, uavs=[uav], tasks=tasks)
         if reasons is not None:

@@ -13,6 +13,7 @@ from coordinator.mission_view.story import EventKind, MissionEvent, Story
 from coordinator.mission_view.wording import (
     because,
     contest_in_words,
+    goal_in_words,
     lateness_in_words,
     seconds_in_words,
     value_in_words,
@@ -71,9 +72,7 @@ class Reasons:
         self._turned[uav] = choice
         # Agents say what they take first, and why afterwards; people want it the other way.
         self._story.put_before(
-            lambda event: (
-                event.kind is EventKind.CLAIMED and uav in event.uavs and choice.task in event.tasks
-            ),
+            lambda event: uav in event.uavs and _follows(event, choice),
             _SOON_S,
         )
         for candidate in choice.candidates:
@@ -143,7 +142,7 @@ class Reasons:
     def _why_released(self, uav: str, task: str, before: Claim, claim: Claim) -> str:
         choice, entry = self._turned.get(uav), self._replica.board.get(task)
         if choice is not None and choice.left == task and choice.task == claim.task:
-            return f": it had turned aside to {choice.task}"
+            return f": it had turned aside to {goal_in_words(choice)}"
         if entry is not None and entry.withdrawn:
             return ": it had been withdrawn"
         for (other, what), outcome in self._replica.outcomes.items():
@@ -202,6 +201,13 @@ class Reasons:
                 text = f"epoch {epoch.number}{why} planned {task} as number {number} for {uav}"
                 text += "" if former is None else f", no longer for {former[0]}"
                 self._tell(EventKind.PLANNED, text, now_s, tasks=[task])
+
+
+def _follows(event: MissionEvent, choice: Choice) -> bool:
+    """Whether that is what the UAV did by its choice."""
+    if choice.task is None:
+        return event.kind is EventKind.BASE
+    return event.kind is EventKind.CLAIMED and choice.task in event.tasks
 
 
 def _places(lists: dict[str, tuple[str, ...]]) -> Iterator[tuple[str, tuple[str, int]]]:

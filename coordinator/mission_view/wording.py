@@ -122,6 +122,13 @@ _VISITED = {
 }
 
 
+_TO_BASE = {
+    "greedy": "its battery was enough for no task any more, and it is ready there before elsewhere"
+}
+"""By rule, why a UAV flies to a base."""
+_TO_BASE_FIRST = "the best list that it found begins with a full battery"
+
+
 def visit_in_words(claim: Claim, before: Claim | None) -> str | None:
     """What a UAV does at a base since ``before``; None if that has not changed."""
     if claim.base is None or claim.stage is None:
@@ -176,12 +183,25 @@ def lateness_in_words(late_s: float) -> str:
     return f", {seconds_in_words(abs(late_s))} {side} than it had said"
 
 
+def goal_in_words(choice: Choice) -> str:
+    """The task that a UAV took, or the base that it flies to."""
+    return str(choice.task) if choice.base is None else f"base {choice.base}"
+
+
+def visit_reason_in_words(choice: Choice) -> str | None:
+    """Why it flies to a base; None if it took a task."""
+    return None if choice.base is None else _TO_BASE.get(choice.rule, _TO_BASE_FIRST)
+
+
 def choice_in_words(choice: Choice) -> str:
-    """Why a UAV took a task; follows what it took."""
+    """Why a UAV took a task, or flies to a base; follows where it goes."""
     rank = choice.rank + 1
     place = _ORDINALS[rank - 1] if rank <= len(_ORDINALS) else f"number {rank}"
     text = f" by the {choice.rule} rule of epoch {choice.epoch}, "
-    text += f"{place} in the sequence: score {value_in_words(choice.score)}"
+    text += f"{place} in the sequence: "
+    if (why := visit_reason_in_words(choice)) is not None:
+        return f"{text}{why}; ready there at {seconds_in_words(choice.completion_s)}"
+    text += f"score {value_in_words(choice.score)}"
     others = [each for each in choice.candidates if each.task != choice.task]
     if others:
         named = [f"{each.task} ({value_in_words(each.score)})" for each in others[:_MOST_RIVALS]]

@@ -32,7 +32,8 @@ def tell(path: Path) -> None:
             choice = fact.message.body
             others = [f"{each.task} {each.score:.2f}" for each in choice.candidates[1:3]]
             rather = f" rather than {', '.join(others)}" if others else ""
-            print(f"{fact.message.writer} chose {choice.task} {choice.score:.2f}{rather}")
+            goal = choice.task or f"base {choice.base}"
+            print(f"{fact.message.writer} chose {goal} {choice.score:.2f}{rather}")
 
 
 def main(recording: str | None = None) -> None:

@@ -19,6 +19,7 @@ from agent.core.field_decision import decide_in_field, divert_in_field, field_ru
 from swarm.allocation.field import FieldProblem
 from swarm.allocation.lower_level import Rule
 from swarm.allocation.rules import GuidedRule
+from swarm.model import BaseId
 from swarm.model.plan import at_base
 from swarm.protocol.board import TaskBoard, rule_of
 from swarm.protocol.events import CommonEvent, MessageReceived, SnapshotsReceived
@@ -78,7 +79,7 @@ def redecide(facts: Iterable[CommonEvent]) -> RedecisionResult:
                 without_inputs += 1
                 continue
             now = memory.decide(uav, choice)
-            if now == (choice.task, choice.completion_s, choice.score):
+            if now == (_went(choice), choice.completion_s, choice.score):
                 agreeing += 1
             else:
                 differing.append(DecisionDifference(uav, choice, *now))
@@ -232,7 +233,7 @@ def redecided_as_json(mission: str, found: RedecisionResult) -> dict[str, Any]:
                 "left": each.choice.left,
                 "rule": each.choice.rule,
                 "recorded": {
-                    "task": each.choice.task,
+                    "task": _went(each.choice),
                     "completion_s": each.choice.completion_s,
                     "score": each.choice.score,
                 },
@@ -268,11 +269,16 @@ def redecided_lines(mission: str, found: RedecisionResult) -> Iterator[str]:
 def _told(each: DecisionDifference) -> str:
     choice = each.choice
     took = f"turned from {choice.left} to" if choice.left is not None else "took"
-    was = _value(choice.task, choice.score, choice.completion_s)
+    was = _value(_went(choice), choice.score, choice.completion_s)
     now = "nothing"
     if each.task is not None and each.score is not None and each.completion_s is not None:
         now = _value(each.task, each.score, each.completion_s)
     return f"{each.decision} at {choice.chosen_s:.1f} s {took} {was}; decided again: {now}"
+
+
+def _went(choice: Choice) -> str:
+    """The task that was taken, or the base that was flown to as schedules name it."""
+    return str(choice.task) if choice.base is None else at_base(BaseId(choice.base))
 
 
 def _value(task: str, score: float, completion_s: float) -> str:

@@ -79,6 +79,7 @@ SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
     TaskEdit: _OF_TASKS,
     Claim: frozenset(_OF_CLAIMS),
     Outcome: frozenset({"reversed"}),
+    Choice: frozenset({"base"}),
     ChoiceBasis: frozenset({"sortie_end_s", "landed_at", "parked", "blocking"}),
 }
 """Fields that came with `FIELD_VERSION`; left out where they are as by default, so that a statement

@@ -76,11 +76,12 @@ class ChoiceBasis(Checked):
 
 @dataclass(frozen=True, slots=True)
 class Choice(Checked):
-    """Key ``uav/<id>/choice``: why that UAV took a task."""
+    """Key ``uav/<id>/choice``: why that UAV took a task, or flies to a base."""
 
     number: Count
     """Of the choices of this life of the agent, from 1; with UAV and incarnation its id in logs."""
-    task: Id
+    task: Id | None
+    """None: it flies to a base instead."""
     left: Id | None
     """The task it turned aside from; None when it was free."""
     chosen_s: Instant
@@ -94,10 +95,16 @@ class Choice(Checked):
     certificate: Flag
     """Whether Theorem 5 proves the choice optimal for this UAV."""
     completion_s: Instant
-    """Predicted completion [s mission time]."""
+    """Predicted completion, or when it will be ready at the base [s mission time]."""
     candidates: Annotated[tuple[Candidate, ...], Len(0, MAX_CANDIDATES)]
     """Best first, as far as the rule values them one by one; may be empty."""
     basis: ChoiceBasis
+    base: Id | None = None
+    """The base it flies to; None: it took a task."""
+
+    def __post_init__(self) -> None:
+        if (self.task is None) == (self.base is None):
+            raise ValueError("a choice is of a task or of a base")
 
 
 def choice_id(uav: str, number: int) -> str:

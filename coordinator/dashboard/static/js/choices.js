@@ -88,9 +88,9 @@ export function choiceDetails(choice, onSelect, open = false) {
       make("time", {}, seconds(choice.mission_s)),
       make("b", {}, choice.uav),
       " → ",
-      make("b", {}, choice.task),
+      make("b", {}, choice.task ?? `base ${choice.base}`),
       choice.left ? make("span", { class: "tag" }, `left ${choice.left}`) : null,
-      make("span", { class: "lead" }, lead(choice)),
+      choice.base ? null : make("span", { class: "lead" }, lead(choice)),
       choice.certificate
         ? make("span", { class: "tag good", title: "Theorem 5 proves it" }, "✓ proven")
         : null,
@@ -116,6 +116,16 @@ function lead({ score, second_score: second }) {
 function body(choice, onSelect) {
   const go = (kind, id) =>
     make("button", { type: "button", class: "link", click: () => onSelect(kind, id) }, id);
+  const decision = make("p", { class: "fine" }, `Decision ${choice.id}`);
+  const by = `by the rule ${choice.rule}, rank ${choice.rank + 1} of epoch ${choice.epoch}`;
+  if (choice.base)
+    return make(
+      "div",
+      { class: "unfolded" },
+      make("p", {}, go("uav", choice.uav), ` flew to base ${choice.base} ${by}: ${choice.why}.`),
+      make("p", {}, `It expected to be ready there at ${seconds(choice.completion_s)}.`),
+      decision,
+    );
   const told = [
     make(
       "p",
@@ -123,7 +133,7 @@ function body(choice, onSelect) {
       go("uav", choice.uav),
       ` took `,
       go("task", choice.task),
-      ` by the rule ${choice.rule}, rank ${choice.rank + 1} of epoch ${choice.epoch}; it expected to be done at ${seconds(choice.completion_s)}.`,
+      ` ${by}; it expected to be done at ${seconds(choice.completion_s)}.`,
     ),
   ];
   if (choice.left)
@@ -160,7 +170,7 @@ function body(choice, onSelect) {
     { class: "unfolded" },
     ...told,
     candidates.length ? bars(choice, go) : null,
-    make("p", { class: "fine" }, `Decision ${choice.id}`),
+    decision,
   );
 }
 

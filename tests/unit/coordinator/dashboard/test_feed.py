@@ -235,6 +235,22 @@ def test_a_choice_is_told_with_its_candidates() -> None:
 
     assert (row["n"], row["id"], row["task"], row["certificate"]) == (1, "u1-4", "t1", True)
     assert row["candidates"] == [{"task": "t1", "score": 9.0}, {"task": "t2", "score": 8.0}]
+    assert (row["base"], row["why"]) == (None, None)
+
+
+def test_a_choice_of_a_base_is_told_with_its_reason() -> None:
+    play = DeskPlay()
+    play.begin()
+    basis = ChoiceBasis(0.0, (0.0, 0.0, 0.0), 1.0, (), (), (), {}, 7)
+    choice = Choice(4, None, None, 1.0, 1, "guided", 0, 9.0, None, False, 2.0, (), basis, "b0")
+    play.take(MessageReceived(Message(MISSION, "u1", Stamp(3, 9), choice)))
+    feed = feed_of(play)
+    feed.look()
+
+    (row,) = Page(feed).read()["choices"]
+
+    assert (row["task"], row["base"], row["candidates"]) == (None, "b0", [])
+    assert row["why"] == "the best list that it found begins with a full battery"
 
 
 def test_a_recording_says_how_far_it_is() -> None:

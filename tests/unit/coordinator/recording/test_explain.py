@@ -17,7 +17,7 @@ from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.events import CommonEvent, MessageReceived, PeerGone, PeerSeen, Tick
 from swarm.protocol.messages import Body, CommandKind, MissionPhase, OperatorCommand, TaskEdit
 from swarm.protocol.timing import Timing
-from swarm.protocol.uav_messages import Candidate, Choice, ChoiceBasis, StatusPhase
+from swarm.protocol.uav_messages import BaseStage, Candidate, Choice, ChoiceBasis, StatusPhase
 from swarm.runtime.errors import InputError
 from tests.support.builders import (
     IDLE,
@@ -117,6 +117,24 @@ def test_a_task_that_was_chosen_claimed_and_done(tape: Tape) -> None:
     assert told.ending == (
         "So t0 was done by u0 at 10.2 s. That is worth 989.75 value·s, 100.0 % of J = 989.75."
     )
+
+
+def test_a_uav_that_flies_to_a_base_tells_why(tape: Tape) -> None:
+    to_base = replace(choice("t0"), task=None, candidates=(), completion_s=130.0, base="b0")
+    stage = BaseStage.APPROACHING
+    visits = replace(proposed("t0", 0.0), task=None, base="b0", stage=stage, arrives_s=10.0)
+    tape.say("u0", visits, 0.0)
+    tape.say("u0", to_base, 0.0)
+    told = explain_uav(tape.stop(), "u0")
+
+    assert texts(told)[-2:] == [
+        (
+            "u0 chose base b0 by the greedy rule of epoch 1, first in the sequence: its battery "
+            "was enough for no task any more, and it is ready there before elsewhere; ready there "
+            "at 130.0 s."
+        ),
+        "u0 flies to base b0 for another battery.",
+    ]
 
 
 def test_a_task_that_two_claim_goes_to_the_stronger_claim(tape: Tape) -> None:

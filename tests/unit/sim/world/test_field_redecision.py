@@ -37,7 +37,7 @@ def choice_of(moment: Moment, rule: str, found: FieldTurnDecision) -> Choice:
     heads = {each.writer: each.stamp for each in moment.said}
     return Choice(
         number=1,
-        task=str(found.task),
+        task=found.task,
         left=None,
         chosen_s=turn.now_s,
         epoch=1,
@@ -49,6 +49,7 @@ def choice_of(moment: Moment, rule: str, found: FieldTurnDecision) -> Choice:
         completion_s=found.end_s,
         candidates=(),
         basis=basis_of(turn, moment, {w: (s.incarnation, s.counter) for w, s in heads.items()}),
+        base=found.base,
     )
 
 
@@ -73,13 +74,13 @@ def basis_of(turn: DecisionTurn, moment: Moment, heads: dict[str, tuple[int, int
 def test_choices_in_the_field_come_out_the_same_and_changed_ones_do_not(rule: str) -> None:
     in_force = field_rule_of(rule, {})
     assert in_force is not None
-    n_choice = n_landed = 0
+    n_choice = n_landed = n_base = 0
     for seed in range(6):
         for moment in moments(seed, rule):
             problem = moment.board.field_problem
             assert problem is not None
             found = decide_in_field(problem, moment.board, in_force, moment.turn)
-            if found is None or found.task is None:
+            if found is None:
                 continue
             told = choice_of(moment, rule, found)
             choice = message(moment.turn.uav, told, counter=1000)
@@ -93,5 +94,6 @@ def test_choices_in_the_field_come_out_the_same_and_changed_ones_do_not(rule: st
             assert len(changed.differing) == 1
             n_choice += 1
             n_landed += moment.turn.landed_at is not None
-    assert n_choice > 0
+            n_base += found.base is not None
+    assert n_choice > n_base > 0
     assert n_landed > 0
