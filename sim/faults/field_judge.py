@@ -15,8 +15,8 @@ decide.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -43,6 +43,18 @@ _SAME_BASE_M = 1.0
 
 
 @dataclass(frozen=True, slots=True)
+class VehicleFlaw:
+    """A vehicle flies worse than planned, from then on."""
+
+    uav: str
+    since_s: float
+    speed_frac: float = 1.0
+    """Share of its speed."""
+    drain_frac: float = 1.0
+    """Multiple of the charge that a second in the air should take."""
+
+
+@dataclass(frozen=True, slots=True)
 class FieldJudge:
     """Judges one world that is over.
 
@@ -64,8 +76,7 @@ class FieldJudge:
     """Until when everybody has heard of a zone, and ordered its way out [s]."""
     stale_s: float = 0.0
     """How old what an agent knows of its vehicle's place may be [s]."""
-    slowed: Mapping[str, float] = field(default_factory=dict)
-    """By UAV: the least share of its speed at which it flew, if it is not all of it."""
+    flaws: Sequence[VehicleFlaw] = ()
 
     def complaints(self, zones: Sequence[DrawnZone] | None = None) -> list[tuple[str, str]]:
         """Invariants that were broken, and how.
@@ -123,7 +134,7 @@ class FieldJudge:
         stops_s = 0.0 if a_m_s2 is None else row.speed_m_s / a_m_s2
         out_m = float(shapely.distance(shapely.boundary(forbidden), shapely.Point(place[:2])))
         out_m += row.speed_m_s * (stops_s / 2.0 + self.stale_s)
-        takes_s = flown_s(out_m, speed_m_s, a_m_s2) / self.slowed.get(uav, 1.0)
+        takes_s = flown_s(out_m, speed_m_s, a_m_s2) / _slowest(self.flaws, uav)
         return since_s + stops_s + takes_s
 
     # -- times --------------------------------------------------------------------------
@@ -156,6 +167,16 @@ class FieldJudge:
                 ]
                 if len(here) > (base.slots or 0):
                     yield f"{', '.join(here)} stand at {base.id} at {stay.begin_s:.3f} s"
+
+
+def _slowest(flaws: Iterable[VehicleFlaw], uav: str) -> float:
+    """The least share of its speed at which it flew."""
+    return min((flaw.speed_frac for flaw in flaws if flaw.uav == uav), default=1.0)
+
+
+def _drain_frac(flaws: Iterable[VehicleFlaw], uav: str) -> float:
+    """How many times as fast as planned its battery drained at most."""
+    return max((flaw.drain_frac for flaw in flaws if flaw.uav == uav), default=1.0)
 
 
 def _forbidden(zone: Zone, margin_m: float, astray_m: float) -> shapely.Geometry:
@@ -209,15 +230,23 @@ class Chances:
         zero_s: mission time 0 in the time of what was seen [s].
         slack_s: who could have done it only to so many seconds is not held to it [s].
         blocked: bases on all of whose slots lost UAVs stand.
+        flaws: that there were by then: agents measure them, and do without what they rule out.
     """
 
     def __init__(
-        self, mission: Mission, zero_s: float, slack_s: float = 1.0, blocked: Collection[str] = ()
+        self,
+        mission: Mission,
+        zero_s: float,
+        slack_s: float = 1.0,
+        blocked: Collection[str] = (),
+        flaws: Sequence[VehicleFlaw] = (),
     ) -> None:
         layers = FlightLayers()
         self._layers_m = [layers.layer_m(place) for place in range(len(mission.uavs))]
         self._mission, self._zero_s = mission, zero_s
-        self._problem = FieldProblem.from_mission(mission)
+        times = [1.0 / _slowest(flaws, uav.id) for uav in mission.uavs]
+        self._drains = [_drain_frac(flaws, uav.id) for uav in mission.uavs]
+        self._problem = FieldProblem.from_mission(mission).calibrated(times, self._drains)
         self._slack_s = slack_s
         self._swaps = np.array([base.id not in blocked for base in mission.bases], dtype=np.bool_)
 
@@ -253,7 +282,7 @@ class Chances:
         now_s = seen.at_s - self._zero_s
         left_s = math.inf
         if uav.endurance_s is not None and seen.battery_frac is not None:
-            left_s = (seen.battery_frac - uav.reserve_frac) * uav.endurance_s
+            left_s = (seen.battery_frac - uav.reserve_frac) * uav.endurance_s / self._drains[row]
         base = None if seen.flies else self._base_at(seen)
         if not seen.flies and base is None:
             return math.inf  # at its start, for good

@@ -12,6 +12,7 @@ from coordinator.operator.requests import OperatorClient
 from coordinator.operator.task_edits import NewTask, TaskWithdrawal
 from coordinator.operator.zone_edits import ZoneRemoval
 from sim.faults.drawn_zones import DrawnZone, zone_over
+from sim.faults.field_judge import VehicleFlaw
 from sim.faults.schedule import Disturbance, DisturbanceKind
 from sim.world.engine import Process
 from sim.world.rough_network import RoughNetwork
@@ -40,10 +41,8 @@ class FaultInjector:
         """UAVs whose agents were not always at work, or were stopped by the operator."""
         self.drawn: list[DrawnZone] = []
         """What the operator has drawn in flight, whoever knows of it."""
-        self.drained: set[str] = set()
-        """UAVs whose batteries drain faster than planned."""
-        self.slowed: dict[str, float] = {}
-        """By UAV that flies more slowly: the least share of its speed."""
+        self.flaws: list[VehicleFlaw] = []
+        """Of vehicles that fly more slowly, or whose batteries drain faster."""
         self._world = world
         self._network = network
         self._disturbed_s = 0.0
@@ -95,7 +94,7 @@ class FaultInjector:
                 world.skew(names[0], what.amount or 0.0)
             case DisturbanceKind.SLOW:
                 share = what.amount or 1.0
-                self.slowed[names[0]] = min(share, self.slowed.get(names[0], 1.0))
+                self.flaws.append(VehicleFlaw(names[0], what.at_s, speed_frac=share))
                 world.slow(names[0], share)
             case DisturbanceKind.REFUSE:
                 refusal = names[0], names[1]
@@ -117,8 +116,9 @@ class FaultInjector:
             case DisturbanceKind.ZONE:
                 self._draw_zone(what)
             case DisturbanceKind.DRAIN:
-                self.drained.add(names[0])
-                world.drain(names[0], 1.0 + (what.amount or 0.0))
+                drain_frac = 1.0 + (what.amount or 0.0)
+                self.flaws.append(VehicleFlaw(names[0], what.at_s, drain_frac=drain_frac))
+                world.drain(names[0], drain_frac)
 
     def _draw_zone(self, what: Disturbance) -> None:
         """Over a UAV; nowhere if it is not in the air, or too near to a start or a base."""

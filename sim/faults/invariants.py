@@ -166,8 +166,8 @@ class InvariantChecker:
     def _can_go_on(self, process: Process, task: str) -> bool:
         """Whether constraints still allow the UAV of ``process`` the task that it leaves.
 
-        From where its vehicle truly is, on what is left of its battery, round the zones that its
-        agent knows of. In a plain mission nothing forbids a task.
+        From where its vehicle truly is, as slowly as it truly flies, on what is truly left of its
+        battery, round the zones that its agent knows of. In a plain mission nothing forbids a task.
         """
         world, core, seen = self._world, process.core, self._world.seen(process.name)
         if not is_field(world.mission) or seen is None or not isinstance(core, AgentCore):
@@ -175,7 +175,8 @@ class InvariantChecker:
         tasks = {str(each.id): each for each in (*world.mission.tasks, *self._added())}
         zones = tuple(zone.zone() for zone in zones_in_force(core.replica))
         mission = replace(world.mission, tasks=tuple(tasks.values()), zones=zones)
-        chances = Chances(mission, world.zero_s or 0.0, slack_s=_LATE_S)
+        flaws = self._injector.flaws
+        chances = Chances(mission, world.zero_s or 0.0, slack_s=_LATE_S, flaws=flaws)
         return task not in tasks or chances.can_go_on(seen, process.name, task)
 
     def _look(self) -> None:
@@ -309,7 +310,9 @@ class InvariantChecker:
             if uav in uavs:
                 zones = (*world.mission.zones, *self._drawn_over(uav, seen.at_s))
                 mission = replace(world.mission, tasks=tuple(known.values()), zones=zones)
-                chances = Chances(mission, world.zero_s or 0.0, blocked=self._blocked(seen.at_s))
+                flaws = [flaw for flaw in self._injector.flaws if flaw.since_s <= seen.at_s]
+                blocked = self._blocked(seen.at_s)
+                chances = Chances(mission, world.zero_s or 0.0, blocked=blocked, flaws=flaws)
                 able += chances.could_do({uav: seen}, [task.id]).get(task.id, [])
         return able
 
@@ -354,9 +357,8 @@ class InvariantChecker:
             known_s = self._zone_known_s.get(drawn.zone.id, {})
             heed = {uav: s for uav, s in known_s.items() if uav not in self._injector.left_alone}
             zones.append(replace(drawn, known_s=heed))
-        judge = FieldJudge(
-            self._world, _LATE_S, stale_s=TELEMETRY_GAP_S, slowed=self._injector.slowed
-        )
+        flaws = self._injector.flaws
+        judge = FieldJudge(self._world, _LATE_S, stale_s=TELEMETRY_GAP_S, flaws=flaws)
         for invariant, text in judge.complaints(zones):
             uav = text.partition(" ")[0]
             if not (invariant == "fell" and uav in self._injector.left_alone):

@@ -14,7 +14,7 @@ from typing import Any
 import pytest
 
 from sim.faults.drawn_zones import DrawnZone
-from sim.faults.field_judge import Chances, FieldJudge
+from sim.faults.field_judge import Chances, FieldJudge, VehicleFlaw
 from sim.world.flight_log import BaseStay, LastSeen
 from sim.world.flown_path import MotionPiece
 from sim.world.simulation import simulate_mission
@@ -212,25 +212,28 @@ def test_who_turns_in_flight_may_be_astray_by_what_its_agent_does_not_know_yet()
 
 
 @pytest.mark.parametrize(
-    ("out_s", "uav", "slowed", "is_sound"),
+    ("out_s", "uav", "flaws", "is_sound"),
     [
-        pytest.param(1.0, {}, {}, True, id="at full speed"),
-        pytest.param(1.1, {}, {}, False, id="lingers"),
-        pytest.param(1.1, {}, {"u0": 0.8}, True, id="is slow"),
-        pytest.param(1.9, {"airspeed_m_s": 8.0}, {}, True, id="against the wind"),
-        pytest.param(2.1, {"airspeed_m_s": 8.0}, {}, False, id="lingers in the wind"),
+        pytest.param(1.0, {}, (), True, id="at full speed"),
+        pytest.param(1.1, {}, (), False, id="lingers"),
+        pytest.param(1.1, {}, (VehicleFlaw("u0", 5.0, 0.8),), True, id="is slow"),
+        pytest.param(
+            1.1, {}, (VehicleFlaw("u1", 5.0, 0.8),), False, id="lingers beside a slow one"
+        ),
+        pytest.param(1.9, {"airspeed_m_s": 8.0}, (), True, id="against the wind"),
+        pytest.param(2.1, {"airspeed_m_s": 8.0}, (), False, id="lingers in the wind"),
         # 10 / 5 s to stop 10 m farther in, then 2 · sqrt(20 / 5) s from rest to rest.
-        pytest.param(5.9, {"acceleration_m_s2": 5.0}, {}, True, id="stops first"),
-        pytest.param(6.1, {"acceleration_m_s2": 5.0}, {}, False, id="stops and lingers"),
+        pytest.param(5.9, {"acceleration_m_s2": 5.0}, (), True, id="stops first"),
+        pytest.param(6.1, {"acceleration_m_s2": 5.0}, (), False, id="stops and lingers"),
     ],
 )
 def test_who_is_in_a_zone_has_as_long_as_its_shortest_way_out_takes(
-    out_s: float, uav: dict[str, Any], slowed: dict[str, float], is_sound: bool
+    out_s: float, uav: dict[str, Any], flaws: tuple[VehicleFlaw, ...], is_sound: bool
 ) -> None:
     world = on_a_way((0.0, 100.0, 0.0), (25.0, 100.0, 0.0), (25.0 + out_s, 110.01, 0.0))
     me = replace(MISSION.uavs[0], **uav)
     world.mission = replace(MISSION, uavs=(me,), wind_enu_m_s=(0.0, 3.0))
-    complaints = FieldJudge(world, slowed=slowed).complaints([DRAWN])
+    complaints = FieldJudge(world, flaws=flaws).complaints([DRAWN])
 
     assert [each for each, _ in complaints] == ([] if is_sound else ["in a zone"])
 
@@ -310,3 +313,24 @@ def test_who_can_go_on_has_no_reason_to_leave_its_task(
     seen = replace(SEEN, battery_frac=battery_frac)
 
     assert Chances(mission, 0.0).can_go_on(seen, "u0", "near") is may
+
+
+@pytest.mark.parametrize(
+    ("flaw", "may"),
+    [
+        pytest.param(VehicleFlaw("u0", 1.0, drain_frac=1.5), True, id="drains, and has enough"),
+        pytest.param(VehicleFlaw("u0", 1.0, drain_frac=3.0), False, id="drains too fast"),
+        pytest.param(VehicleFlaw("u0", 1.0, speed_frac=0.7), True, id="is slow, and has enough"),
+        pytest.param(VehicleFlaw("u0", 1.0, speed_frac=0.3), False, id="is too slow"),
+        pytest.param(VehicleFlaw("u1", 1.0, 0.3, 3.0), True, id="another one does worse"),
+    ],
+)
+def test_who_flies_worse_than_planned_is_judged_by_how_it_flies(
+    flaw: VehicleFlaw, may: bool
+) -> None:
+    mission = replace(MISSION, uavs=(CHARGED,), tasks=(NEAR,), bases=())
+    seen = replace(SEEN, battery_frac=0.7)
+    chances = Chances(mission, 0.0, flaws=[flaw])
+
+    assert chances.can_go_on(seen, "u0", "near") is may
+    assert chances.could_do({"u0": seen}, ["near"]) == ({"near": ["u0"]} if may else {})
