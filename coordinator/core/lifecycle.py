@@ -288,7 +288,14 @@ class StartGate:
         if is_of_field(mission):
             fleet = _in_layers(fleet, brief)
         tasks = tuple(task for task in mission.tasks if task.id in self._planned_tasks)
-        mission = replace(mission, uavs=fleet, tasks=tasks, origin=self._mission.origin)
+        mission = replace(
+            mission,
+            uavs=fleet,
+            tasks=tasks,
+            origin=self._mission.origin,
+            # What is known of it may have no constraints, or not yet: its plan has a schedule.
+            schema=max(mission.schema, self._mission.schema),
+        )
         return [MakePlan(self._request, mission, self._method, self._seed)]
 
 

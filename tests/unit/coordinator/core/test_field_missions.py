@@ -186,6 +186,20 @@ def test_before_the_start_it_plans_anew_round_a_zone() -> None:
     assert coordinator.phase is MissionPhase.RUNNING
 
 
+def test_a_plan_without_constraints_is_of_the_schema_of_the_file() -> None:
+    """It tells a schedule, also while what asks for one has not appeared."""
+    window = replace(task("t1", 50.0), appears_s=30.0, closes_s=90.0)
+    for flown in (
+        replace(mission([U0], [task("t0", 5.0)]), schema=2),
+        mission([U0], [task("t0", 5.0), window]),
+    ):
+        (wanted,) = plans_wanted(LoneCoordinator(flown).log)
+        assert [each.id for each in wanted.mission.tasks] == ["t0"]
+        assert wanted.mission.schema == 2
+    (wanted,) = plans_wanted(LoneCoordinator(mission([U0], [task("t0", 5.0)])).log)
+    assert wanted.mission.schema == 1
+
+
 def test_that_a_uav_may_start_again_is_logged_and_kept() -> None:
     coordinator = LoneCoordinator(mission([U0], [WINDOWED])).started()
     coordinator.hear(OPERATOR, UavReady("u0", 1, "battery 7"))
