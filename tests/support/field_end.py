@@ -39,14 +39,29 @@ class Leftover:
 
 
 def as_flown(draft: Mapping[str, Any], mission: Mission) -> FieldScenario:
-    """The scenario of ``draft`` with tasks that appear when they did in ``mission``."""
+    """The scenario of ``draft`` with tasks that appear when they did in ``mission``.
+
+    A task that appears later than it says has its window and its due time as much later as it has
+    been open without anybody's knowledge.
+    """
     appears_s = {str(task.id): task.appears_s for task in mission.tasks}
     rows = [
-        {**row, "appears_s": appears_s[row["id"]]}
+        _as_it_appeared(row, appears_s[row["id"]])
         for row in draft["task"]
         if row["id"] in appears_s
     ]
     return read({**draft, "task": rows})
+
+
+def _as_it_appeared(row: Mapping[str, Any], appears_s: float) -> dict[str, Any]:
+    moved = {**row, "appears_s": appears_s}
+    late_s = max(0.0, appears_s - row.get("opens_s", 0.0))
+    if appears_s != row.get("appears_s", 0.0) and late_s > 0.0:
+        if "closes_s" in row:
+            moved |= {"opens_s": appears_s, "closes_s": row["closes_s"] + late_s}
+        if "due_s" in row:
+            moved["due_s"] = row["due_s"] + late_s
+    return moved
 
 
 def leftovers(
