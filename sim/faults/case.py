@@ -64,7 +64,7 @@ class Case:
     standby: bool = False
     """Whether a second coordinator stands by."""
     bug: str = ""
-    """A protocol bug put in on purpose; see `sim.faults.planted_bugs`."""
+    """A bug put in on purpose; see `sim.faults.planted_bugs`."""
     schedule: tuple[Disturbance, ...] = ()
     mission: Mission | None = None
     """Flown instead of one drawn from the seed."""

@@ -1,4 +1,4 @@
-"""Protocol bugs put in on purpose, to see that the invariants find them.
+"""Bugs put in on purpose, to see that the invariants find them.
 
 Each is a context manager that patches the runtime while it lasts; none is ever active by itself.
 """
@@ -7,11 +7,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
+from functools import partial
 from typing import Final
 
 import agent.core.decision
 import swarm.protocol.board
 import swarm.protocol.registers
+from agent.core.calibration import FlightMeter
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import Message
 from swarm.protocol.uav_messages import Claim, ClaimPhase
@@ -60,9 +62,25 @@ def _suspect_without_link() -> AbstractContextManager[None]:
     return _patched(Membership, "link", link)
 
 
+@contextmanager
+def _measure_wrongly(which: int, frac: float) -> Iterator[None]:
+    """Agents measure so many times what is true: of times of legs (0) or of drain (1)."""
+    vote = FlightMeter._vote  # noqa: SLF001 - where both kinds of measurements enter
+
+    def wrongly(self: FlightMeter, kind: int, measured: float, now_s: float) -> bool:
+        return vote(self, kind, measured * (frac if kind == which else 1.0), now_s)
+
+    with _patched(FlightMeter, "_vote", wrongly):
+        yield
+
+
 BUGS: Final[dict[str, Callable[[], AbstractContextManager[None]]]] = {
     "ignore-incarnations": _ignore_incarnations,
     "proposed-beats-held": _proposed_beats_held,
     "suspect-without-link": _suspect_without_link,
+    "times-mismeasured": partial(_measure_wrongly, 0, 2.0),
+    "drain-mismeasured": partial(_measure_wrongly, 1, 1.3),
 }
 """By name."""
+FIELD_BUGS: Final = frozenset({"times-mismeasured", "drain-mismeasured"})
+"""Those that show only in missions with the field's constraints."""

@@ -60,7 +60,7 @@ def soak(
         seeds: how many.
         jobs: processes that play them.
         kinds: what may go wrong.
-        bug: a protocol bug put in on purpose; see `sim.faults.planted_bugs`.
+        bug: a bug put in on purpose; see `sim.faults.planted_bugs`.
         progress: called with the number of cases played since it was last called.
 
     Returns:
