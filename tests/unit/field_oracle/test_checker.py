@@ -249,6 +249,18 @@ def test_simulation_as_planned_is_praised(scenario: FieldScenario, simulation: J
     assert check_simulation(scenario, simulation, as_planned=True, exit_status=0) == []
 
 
+def test_what_is_left_out_may_be_done_where_the_plan_is_disturbed(
+    scenario: FieldScenario, simulation: Json
+) -> None:
+    simulation["open"].remove("far")
+    (nowhere,) = check_simulation(scenario, simulation)
+    simulation["done"].append("far")
+
+    assert nowhere == "far is left out, but not open"
+    assert check_simulation(scenario, simulation) == []
+    assert check_simulation(scenario, simulation, as_planned=True) == [nowhere]
+
+
 FLOWN: dict[str, tuple[Callable[[Json], object], str]] = {
     "left out and not open": (lambda s: s.update(open=[]), "but not open"),
     "no distance of two": (lambda s: s.update(closest_approach_m=-1.0), "closest_approach_m"),
