@@ -213,6 +213,7 @@ def agent(
     """
     from agent.core.agent_core import AgentCore
     from agent.core.path_clearance import PATH_CLEARANCE_M
+    from agent.core.verticals import Verticals
     from agent.links.mavlink_vehicle import MavlinkVehicle
     from agent.vehicle.config import BridgeConfig
     from agent.vehicle.signing import load_signing_key
@@ -267,6 +268,7 @@ def agent(
             rejoin=rejoin,
             without_bus_s=None if without_bus_s is None else without_bus_s * speedup,
             path_clearance_m=PATH_CLEARANCE_M,
+            verticals=Verticals(),
         )
 
     clock = ScaledClock(speedup)

@@ -39,6 +39,7 @@ from agent.core.states import (
 )
 from agent.core.stop_conditions import BusLossTimer, EndCondition, OperatorCommands
 from agent.core.vehicle_commander import VehicleCommander
+from agent.core.verticals import Verticals
 from swarm.protocol.board import RuleMaker, rule_of
 from swarm.protocol.events import (
     Finish,
@@ -81,6 +82,8 @@ class AgentCore(AgentPart):
         rejoin: take part again, although an earlier life left this flight of the mission.
         path_clearance_m: how much farther than their margin ways lead past zones, for vehicles
             that do not fly quite where they are told.
+        verticals: what landing and climbing cost, and where it lands, as far as it is known
+            beforehand; None for vehicles that take no time for it.
         without_bus_s: go home when the own link to the bus has been down for that long; None
             to fly on.
         make_rule: what it decides by in an epoch of that rule and those routes. Every UAV of a
@@ -101,6 +104,7 @@ class AgentCore(AgentPart):
         without_bus_s: float | None = None,
         make_rule: RuleMaker = rule_of,
         path_clearance_m: float = 0.0,
+        verticals: Verticals | None = None,
         make_field_rule: FieldRuleMaker = field_rule_of,
     ) -> None:
         self.uav = uav
@@ -120,6 +124,7 @@ class AgentCore(AgentPart):
             announcer=Announcer(RegisterWriter(mission, uav, incarnation), self.replica, timing),
             machine=AgentStateMachine(self._note_impossible),
             path_clearance_m=path_clearance_m,
+            verticals=verticals,
             make_field_rule=make_field_rule,
         )
         super().__init__(context)

@@ -221,16 +221,18 @@ class BaseVisits(AgentPart):
         self._mission_view.arrive(base.position_enu_m)
         if claim.stage is not BaseStage.WAITING:  # an earlier life of it may have waited already
             mission_s = self._mission_view.mission_s(now_s)
-            off_s = math.inf if claim.arrives_s is None else abs(mission_s - claim.arrives_s)
+            lands_s = mission_s + self._flights.land_s
+            off_s = math.inf if claim.arrives_s is None else abs(lands_s - claim.arrives_s)
             self._visit.punctual = (
                 self._visit.known_at_s <= now_s
                 and off_s <= _PUNCTUAL * self._timing.objection_window_s
             )
             if not self._visit.punctual:  # its place in the order is not what others know it to be
-                self._say(replace(claim, arrives_s=mission_s))
+                self._say(replace(claim, arrives_s=lands_s))
         else:
             self._visit.waited_at_s = now_s + self._timing.objection_window_s
-        begins_s = claim.completion_s - base.swap_s + self._timing.patience_s
+        begins_s = claim.completion_s - base.swap_s - self._flights.land_s
+        begins_s += self._timing.patience_s
         self._visit.late_at_s = now_s + begins_s - self._mission_view.mission_s(now_s)
         self._land_or_wait(base, now_s)
 
@@ -304,9 +306,12 @@ class BaseVisits(AgentPart):
     def _land(self, base: BaseSpec, claim: Claim, now_s: float) -> None:
         self._visit, self._on_ground = BaseVisit(), self._machine.state in AT_BASE
         self._machine.take(Trigger.SLOT_FREE)
-        ready_s = self._mission_view.mission_s(now_s) + base.swap_s
+        lands_s = 0.0 if self._on_ground else self._flights.land_s
+        ready_s = self._mission_view.mission_s(now_s) + lands_s + base.swap_s
         self._announcer.explain(f"swaps its battery at base {base.id}")
         self._swap(base)
+        if not self._on_ground:
+            self._flights.meter.come_down(now_s)
         held = replace(claim, phase=ClaimPhase.HELD, completion_s=ready_s)
         self._say(replace(held, stage=BaseStage.LANDED))
         self._log("lands", base=base.id)
@@ -397,6 +402,7 @@ class BaseVisits(AgentPart):
         if not swaps or claim is None or base is None:
             return
         self._on_ground = True
+        self._flights.meter.touch_down(now_s)
         self._sortie.land()
         self._mission_view.stand(base.position_enu_m)
         ready_s = self._mission_view.mission_s(now_s) + base.swap_s

@@ -1,14 +1,18 @@
-"""What one UAV's agent measures of its flight: how long legs take, and how fast the battery drains.
+"""What one UAV's agent measures of its flight: times of legs, drain, and how it lands and climbs.
+
+**Landing and climbing** are known for a vehicle before it has flown, and told at once, as plans
+need them; measured they count from the order to land to `Landed`, and as what the first leg from
+the ground takes longer. What takes longer than was known is believed at once.
 
 **A leg** counts from departure, at rest in the air, to arrival, where it was predicted to take
 `_SHORTEST_S` or more. One that was broken off, held, diverted or flown on another way does not, nor
-one that began on the ground: take-off is no part of the prediction. **The drain** counts over each
+one that began on the ground. **The drain** counts over each
 `_SPAN_FRAC` of the charge used in one flight, hovering included.
 
-Each is a share of the prediction by the brief, and has one vote among the last `_WINDOW` in a
-running median, which begins with `_PRIOR` votes for what is known already. So one leg or two change
-little, an odd one nothing, and after four the estimate is what was measured. Votes that
-nobody would believe are none. What is told of it in
+Each of these two is a share of the prediction by the brief, and has one vote among the last
+`_WINDOW` in a running median, which begins with `_PRIOR` votes for what is known already. So one
+leg or two change little, an odd one nothing, and after four the estimate is what was measured.
+Votes that nobody would believe are none. What is told of it in
 the own register moves in steps of `STEP_FRAC` or more, so that neither decisions nor problems
 change with each leg. A later life begins with what the register says.
 
@@ -32,6 +36,7 @@ from agent.core.states import AgentState
 from swarm.protocol.calibration import (
     AS_BRIEFED,
     DRAIN_FRAC_RANGE,
+    LONGEST_VERTICAL_S,
     TIME_FRAC_RANGE,
     FlightRates,
     clamped,
@@ -41,6 +46,8 @@ from swarm.protocol.uav_messages import Calibration
 
 STEP_FRAC: Final = 0.02
 """Least change of an estimate that is told, as a share of what was told before."""
+STEP_S: Final = 1.0
+"""Least change of the times of landing and climbing that is told [s]."""
 _PRIOR, _WINDOW = 2, 9
 _SHORTEST_S: Final = 3.0
 _SPAN_FRAC: Final = 0.04
@@ -84,6 +91,19 @@ class _Departure:
     predicted_s: float
     """By the brief."""
     at_s: float
+    climbs: bool = False
+    """It departs from the ground."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Estimates:
+    times: RunningMedian
+    drains: RunningMedian
+    landings: RunningMedian
+    climbs: RunningMedian
+
+
+_VERTICAL_RANGE = (0.0, LONGEST_VERTICAL_S)
 
 
 class FlightMeter(AgentPart):
@@ -93,14 +113,19 @@ class FlightMeter(AgentPart):
         super().__init__(context)
         self.sortie = SortieClock()
         """How long the battery lasts."""
-        self._known: tuple[RunningMedian, RunningMedian] | None = None
-        """Of times and of drain; None before the first measurement of this life."""
+        self._verticals = context.verticals
+        self._known: _Estimates | None = None
+        """None before the first measurement of this life."""
         self._legs_before = 0
         self._leg = 0
         self._departure: _Departure | None = None
         """Of that leg, if it counts."""
         self._at_rest = False
         """Whether the vehicle hovers where its last leg has ended."""
+        self._stands = False
+        """Whether it is about to take off."""
+        self._lands_since_s: float | None = None
+        """When it was told to land, in the air."""
         self._span: tuple[float, float] | None = None
         """When the charge was what, at the beginning of what is being measured."""
 
@@ -113,7 +138,7 @@ class FlightMeter(AgentPart):
         told = self.rates
         if self._known is None or not self._counts:
             return told.drain_frac
-        times, drains = self._known
+        times, drains = self._known.times, self._known.drains
         slow = times.measured if times.count > 1 else None  # one leg may be odd
         longer = _worse(told.time_frac, slow, TIME_FRAC_RANGE) / told.time_frac
         return longer * _worse(told.drain_frac, drains.measured, DRAIN_FRAC_RANGE)
@@ -122,6 +147,19 @@ class FlightMeter(AgentPart):
     def rates(self) -> FlightRates:
         """What this UAV has told of itself, as everybody believes it."""
         return AS_BRIEFED if not self._counts else self._told
+
+    def introduce(self) -> None:
+        """Tell what is known of the vehicle before it flies, if that matters in this mission."""
+        brief, me, told = self._replica.brief, self._mission_view.me, self._told
+        matters = brief is not None and is_calibrated(brief)
+        if self._verticals is None or me is None or me.endurance_s is None or not matters:
+            return
+        if told.land_s == 0.0:
+            before = self._replica.calibrations.get(self._uav)
+            height_m, legs = me.layer_m, 0 if before is None else before.legs
+            land_s = round(self._verticals.land_s(height_m), 1)
+            climb_s = round(self._verticals.climb_s(height_m), 1)
+            self._say(Calibration(told.time_frac, told.drain_frac, legs, land_s, climb_s))
 
     # -- legs --------------------------------------------------------------------------
 
@@ -134,19 +172,34 @@ class FlightMeter(AgentPart):
     def land(self) -> None:
         """It is on the ground, or about to land."""
         self._departure, self._at_rest, self._span = None, False, None
+        self._stands, self._lands_since_s = False, None
+
+    def come_down(self, now_s: float) -> None:
+        """It has been told to land, hovering in its layer."""
+        self._lands_since_s = now_s
+
+    def touch_down(self, now_s: float) -> None:
+        """It has landed."""
+        since_s, self._lands_since_s = self._lands_since_s, None
+        if since_s is not None and self._counts and self._verticals is not None:
+            self._vote(self._medians.landings, now_s - since_s, _VERTICAL_RANGE, now_s)
 
     def take_off(self, now_s: float) -> None:
         """It leaves the ground, and flies as it was decided there.
 
         More caution needs more that is measured: else it could land again and again for it.
         """
+        self._stands = True
         self.sortie.heed(self.rates.drain_frac, self._mission_view.mission_s(now_s))
 
     def depart(self, leg: int, predicted_s: float | None = None) -> None:
         """It sets off now, and should take so long by the brief; None: nobody can tell."""
         at_rest, self._at_rest, self._departure, self._leg = self._at_rest, False, None, leg
-        if at_rest and predicted_s is not None and predicted_s >= _SHORTEST_S:
-            self._departure = _Departure(predicted_s, self._mission_view.now_s)
+        stands, self._stands = self._stands, False
+        if predicted_s is None:
+            return
+        if stands or (at_rest and predicted_s >= _SHORTEST_S):
+            self._departure = _Departure(predicted_s, self._mission_view.now_s, stands)
 
     def arrive(self, leg: int, now_s: float) -> bool:
         """It is where that leg ends; whether the battery is to be looked at anew."""
@@ -155,7 +208,14 @@ class FlightMeter(AgentPart):
         departure, self._departure, self._at_rest = self._departure, None, True
         if departure is None or not self._counts:
             return False
-        return self._vote(0, (now_s - departure.at_s) / departure.predicted_s, now_s)
+        took_s = now_s - departure.at_s
+        if not departure.climbs:
+            time_frac = took_s / departure.predicted_s
+            return self._vote(self._medians.times, time_frac, TIME_FRAC_RANGE, now_s)
+        if self._verticals is None:
+            return False
+        climb_s = max(0.0, took_s - departure.predicted_s * self.rates.time_frac)
+        return self._vote(self._medians.climbs, climb_s, _VERTICAL_RANGE, now_s)
 
     # -- battery -----------------------------------------------------------------------
 
@@ -181,7 +241,8 @@ class FlightMeter(AgentPart):
         if used_frac < _SPAN_FRAC or flown_s <= 0.0:
             return False
         self._span = now_s, battery_frac
-        return self._vote(1, used_frac * endurance_s / flown_s, now_s)
+        drain_frac = used_frac * endurance_s / flown_s
+        return self._vote(self._medians.drains, drain_frac, DRAIN_FRAC_RANGE, now_s)
 
     # -- what comes of it --------------------------------------------------------------
 
@@ -195,20 +256,22 @@ class FlightMeter(AgentPart):
         return FlightRates.believed(self._replica.calibrations.get(self._uav))
 
     @property
-    def _medians(self) -> tuple[RunningMedian, RunningMedian]:
-        """Of times and of drain, begun with what an earlier life has told."""
+    def _medians(self) -> _Estimates:
+        """Begun with what an earlier life has told."""
         if self._known is None:
             told, before = self._told, self._replica.calibrations.get(self._uav)
-            self._known = RunningMedian(told.time_frac), RunningMedian(told.drain_frac)
+            known = told.time_frac, told.drain_frac, told.land_s, told.climb_s
+            self._known = _Estimates(*map(RunningMedian, known))
             self._legs_before = 0 if before is None else before.legs
         return self._known
 
-    def _vote(self, which: int, vote: float, now_s: float) -> bool:
-        within = (TIME_FRAC_RANGE, DRAIN_FRAC_RANGE)[which]
+    def _vote(
+        self, medians: RunningMedian, vote: float, within: tuple[float, float], now_s: float
+    ) -> bool:
         if not 0.5 * within[0] <= vote <= within[1]:  # held up, or no measurement at all
             return False
         before = self.rates, self.cautious_drain_frac
-        self._medians[which].add(vote)
+        medians.add(vote)
         self._tell()
         now = self.rates, self.cautious_drain_frac
         self.sortie.heed(now[1], self._mission_view.mission_s(now_s))
@@ -216,16 +279,27 @@ class FlightMeter(AgentPart):
 
     def _tell(self) -> None:
         """State the register anew, if the estimates have moved by a step."""
-        told, (times, drains) = self._told, self._medians
+        told, found = self._told, self._medians
         now = FlightRates(
-            told_anew(told.time_frac, times.value, TIME_FRAC_RANGE),
-            told_anew(told.drain_frac, drains.value, DRAIN_FRAC_RANGE),
+            told_anew(told.time_frac, found.times.value, TIME_FRAC_RANGE),
+            told_anew(told.drain_frac, found.drains.value, DRAIN_FRAC_RANGE),
+            _vertical_anew(told.land_s, found.landings),
+            _vertical_anew(told.climb_s, found.climbs),
         )
         if now == told:
             return
-        legs = self._legs_before + times.count
-        self._say(Calibration(now.time_frac, now.drain_frac, legs))
-        self._log("calibrated", time_frac=now.time_frac, drain_frac=now.drain_frac, legs=legs)
+        legs = self._legs_before + found.times.count
+        self._say(Calibration(now.time_frac, now.drain_frac, legs, now.land_s, now.climb_s))
+        upright: dict[str, object] = {"land_s": now.land_s, "climb_s": now.climb_s}
+        upright = {} if self._verticals is None else upright
+        fracs = {"time_frac": now.time_frac, "drain_frac": now.drain_frac}
+        self._log("calibrated", **fracs, legs=legs, **upright)
+
+
+def _vertical_anew(told_s: float, found: RunningMedian) -> float:
+    """What to tell of landing or climbing: at once what is longer, but only in steps."""
+    believed_s = max(found.value, found.measured or 0.0)
+    return told_s if abs(believed_s - told_s) < STEP_S else round(believed_s, 1)
 
 
 def _worse(told: float, measured: float | None, within: tuple[float, float]) -> float:

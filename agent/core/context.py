@@ -9,6 +9,7 @@ from agent.core.announcer import Announcer
 from agent.core.interface import Action, OrderVehicle, VehicleOrder
 from agent.core.mission_view import MissionView, Peers
 from agent.core.states import AgentStateMachine
+from agent.core.verticals import Verticals
 from swarm.protocol.events import LogLine
 from swarm.protocol.messages import Body
 from swarm.protocol.registers import Replica
@@ -35,6 +36,8 @@ class AgentContext:
     """What it decides by in an epoch where the field's constraints count."""
     path_clearance_m: float = 0.0
     """How much farther than their margin ways lead past zones [m]."""
+    verticals: Verticals | None = None
+    """How its vehicle lands and climbs; None where that takes no time."""
     actions: list[Action] = field(default_factory=list)
     """What has come of the step so far, in order."""
 

@@ -79,6 +79,10 @@ class FieldTasking(Tasking):
         """An earlier life of this agent claimed so: what it says of the battery."""
         self._sortie.recall(claim.sortie_end_s)
 
+    def introduce(self) -> None:
+        """The mission is known: tell what is known of the vehicle before it flies."""
+        self._flights.meter.introduce()
+
     def stand(self, now_s: float) -> bool:
         """Whether the vehicle stands at a base by its last claim: stay there, then."""
         return self._flights.problem is not None and self._visits.stand(now_s)
@@ -98,7 +102,8 @@ class FieldTasking(Tasking):
         base = None if name is None else self._flights.base(name)
         if base is None:
             return self._flights.way_home()
-        return HomeFlight((), self._mission_view.in_layer(base.position_enu_m), base.id, 0.0)
+        above_enu_m = self._mission_view.in_layer(self._flights.spot(base))
+        return HomeFlight((), above_enu_m, base.id, 0.0)
 
     def arrive(self, leg: int, now_s: float) -> None:
         """The vehicle is where that leg ends."""

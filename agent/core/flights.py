@@ -56,6 +56,11 @@ class Flights(AgentPart):
         self._clearance_m = context.path_clearance_m
         self._clearance: PathClearance | None = None
         self._clearance_of: FieldProblem | None = None
+        self._verticals = context.verticals
+        self._spots: dict[str, Point] = {}
+        """By base, where it lands."""
+        self._spots_of: object = None
+        """The brief by which that is."""
 
     # -- what is known of the field -------------------------------------------------------
 
@@ -70,6 +75,38 @@ class Flights(AgentPart):
         brief = self._replica.brief
         bases = () if brief is None else brief.bases
         return next((base for base in bases if base.id == name), None)
+
+    def spot(self, base: BaseSpec) -> Point:
+        """Where this UAV lands at that base [m; on the ground]: each of a fleet elsewhere."""
+        brief = self._replica.brief
+        if self._verticals is None or brief is None:
+            return base.position_enu_m
+        if self._spots_of is not brief:
+            self._spots, self._spots_of = {}, brief
+        if base.id not in self._spots:
+            fleet = [uav.id for uav in brief.uavs]
+            self._spots[base.id] = self._verticals.spot(
+                base.position_enu_m,
+                fleet.index(self._uav) if self._uav in fleet else 0,
+                [uav.position_enu_m for uav in brief.uavs],
+                [zone.zone() for zone in brief.zones],
+                brief.zone_margin_m,
+            )
+        return self._spots[base.id]
+
+    @property
+    def land_s(self) -> float:
+        """How long it takes from above a base until it has landed, as predictions have it [s]."""
+        problem = self.problem
+        return 0.0 if problem is None else problem.land_s(self._row(problem), 0)
+
+    @property
+    def climb_s(self) -> float:
+        """How long it takes from a base to where its legs begin, likewise [s]."""
+        problem = self.problem
+        if problem is None or problem.network is None:
+            return 0.0
+        return float(problem.network.climb_s[self._row(problem)])
 
     def zones_changed(self) -> bool:
         """Whether other zones are in force than when this was last asked."""
@@ -138,15 +175,22 @@ class Flights(AgentPart):
         problem, place_enu_m = self.problem, self._mission_view.place_enu_m
         if problem is None or place_enu_m is None:
             return None
-        return self._widened(way_to(problem, self._row(problem), place_enu_m, node))
+        way = self._widened(way_to(problem, self._row(problem), place_enu_m, node))
+        if way is None or not self._mission_view.stands:
+            return way
+        climb_s = self.climb_s
+        return replace(way, duration_s=way.duration_s + climb_s, upright_s=way.upright_s + climb_s)
 
     def _widened(self, way: Way | None) -> Way | None:
-        """That way as a vehicle is led that does not fly quite where it is told."""
+        """That way as a vehicle is led that does not fly quite where it is told, to its spot."""
         problem, brief, place_enu_m = (
             self.problem,
             self._replica.brief,
             self._mission_view.place_enu_m,
         )
+        base = None if way is None or way.base is None else self.base(way.base)
+        if way is not None and base is not None and self._verticals is not None:
+            way = replace(way, end_enu_m=self._mission_view.in_layer(self.spot(base)))
         if way is None or not self._clearance_m or brief is None or place_enu_m is None:
             return way
         if self._clearance is None or self._clearance_of is not problem:
@@ -154,9 +198,19 @@ class Flights(AgentPart):
             margin_m = brief.zone_margin_m
             self._clearance = PathClearance(zones, margin_m, self._clearance_m)
             self._clearance_of = problem
-        begin_enu_m = self._mission_view.in_layer(place_enu_m)
+        begin_enu_m = self._mission_view.in_layer(self._standing_m(place_enu_m))
         points = self._clearance.widened((begin_enu_m, *way.via_enu_m, way.end_enu_m))
         return replace(way, via_enu_m=points[1:-1])
+
+    def _standing_m(self, place_enu_m: Point) -> Point:
+        """Where it really is whose place is reckoned to be a base's."""
+        brief, telemetry = self._replica.brief, self._mission_view.telemetry
+        if self._verticals is None or brief is None or telemetry is None:
+            return place_enu_m
+        return next(
+            (self.spot(base) for base in brief.bases if base.position_enu_m == place_enu_m),
+            place_enu_m,
+        )
 
     def _row(self, problem: FieldProblem) -> int:
         return problem.uav_ids.index(UavId(self._uav))
@@ -175,7 +229,8 @@ class Flights(AgentPart):
     ) -> None:
         """Fly that way, to a task or above a base."""
         self.leg += 1
-        self.meter.depart(self.leg, way.duration_s / self._time_frac())
+        flown_s = way.duration_s - way.upright_s
+        self.meter.depart(self.leg, flown_s / self._time_frac())
         name = None if task is None else task.task
         via_enu_m = way.via_enu_m
         self._order(
@@ -228,7 +283,7 @@ class Flights(AgentPart):
         self.meter.land()
         me = self._mission_view.me
         speed_m_s = None if me is None else me.speed_m_s
-        self._order(Swap(self.leg, base.position_enu_m, base.swap_s, speed_m_s))
+        self._order(Swap(self.leg, self.spot(base), base.swap_s, speed_m_s))
 
     def let_start(self) -> None:
         """A person has seen to the vehicle, which stands at a base."""
@@ -238,6 +293,6 @@ class Flights(AgentPart):
         """Land at a base without taking any of its slots."""
         self.meter.land()
         self.leg += 1  # nothing is heard any more of how it came there
-        above_enu_m = self._mission_view.in_layer(base.position_enu_m)
+        above_enu_m = self._mission_view.in_layer(self.spot(base))
         reason = f"its battery is used up, and no slot of base {base.id} is free"
         self._order(Return(reason, via_enu_m=above_enu_m, land=True))

@@ -149,6 +149,11 @@ class MissionView:
         """The vehicle has landed there, where it is whatever height it tells."""
         self._stands_enu_m = place_enu_m
 
+    @property
+    def stands(self) -> bool:
+        """Whether the vehicle has landed, and not taken off again."""
+        return self._stands_enu_m is not None
+
     def leave_ground(self) -> None:
         """The vehicle takes off from where it stands, straight up."""
         if self._stands_enu_m is not None:

@@ -98,15 +98,15 @@ class TimeLimits(AgentPart):
         """When the UAV has to head ``home`` from where it is, on the own clock; None: never.
 
         Only who stands by nothing in the air has to: other ways home are reckoned with already.
-        Above a base it has nowhere to go, and lands when its sortie ends, beside the slots if need
-        be.
+        Above a base it has nowhere to go, and lands before its sortie ends, beside the slots if
+        need be.
         """
         end_s, state = self._sortie.end_s, self._machine.state
         if math.isinf(end_s) or not self._mission_view.running or stands:
             return None
         end_at_s = now_s + end_s - self._mission_view.mission_s(now_s)
         if state is AgentState.ABOVE_BASE:
-            return end_at_s
+            return end_at_s - self._flights.land_s
         if state not in WITHOUT_AIM:
             return None
         return None if home is None else end_at_s - home.duration_s - self._timing.patience_s

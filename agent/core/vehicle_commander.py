@@ -169,6 +169,7 @@ class VehicleCommander(AgentPart):
         if not self._machine.take(trigger):
             return
         self._announcer.explain("")
+        self._tasking.introduce()
         order = Prepare(
             self._mission_view.in_layer(me.position_enu_m),
             me.speed_m_s,

@@ -143,7 +143,7 @@ class MissionNarrator:
                 self._hear_claim(message.writer, body, claim, now_s)
             case Outcome():
                 self._hear_outcome(message.writer, body, now_s)
-            case Calibration() if self._is_calibrated:
+            case Calibration() if self._is_calibrated and _flies_otherwise(body, earlier):
                 text = f"{message.writer} {rates_in_words(FlightRates.believed(body))}"
                 detail = f", as {counted(body.legs, 'leg')} show"
                 uavs = [message.writer]
@@ -342,6 +342,14 @@ class MissionNarrator:
     def _fleet(self) -> list[str]:
         brief = self._replica.brief
         return [] if brief is None else [uav.id for uav in brief.uavs]
+
+
+def _flies_otherwise(told: Calibration, earlier: Message | None) -> bool:
+    """Whether a UAV flies otherwise than it told before, however long it lands or climbs."""
+    before = None if earlier is None else earlier.body
+    known = FlightRates.believed(before if isinstance(before, Calibration) else None)
+    now = FlightRates.believed(told)
+    return (known.time_frac, known.drain_frac) != (now.time_frac, now.drain_frac)
 
 
 _SILENT = ", silent though its link is up"

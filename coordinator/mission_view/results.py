@@ -310,9 +310,10 @@ def deviations(mission: Mission, result: MissionResult) -> list[ReportFact]:
     if popups:
         text = f"{counted(len(popups), 'task')} unknown to the plan"
         found.append(ReportFact("pop-ups", text, popups))
-    if result.rates:
-        text = f"{counted(len(result.rates), 'UAV')} otherwise than planned"
-        how = tuple(f"{uav} {rates_in_words(each)}" for uav, each in sorted(result.rates.items()))
+    otherwise = [item for item in sorted(result.rates.items()) if not item[1].as_briefed]
+    if otherwise:
+        text = f"{counted(len(otherwise), 'UAV')} otherwise than planned"
+        how = tuple(f"{uav} {rates_in_words(each)}" for uav, each in otherwise)
         found.append(ReportFact("measured", text, how))
     if result.epochs > 1:
         found.append(ReportFact("re-planned", f"{result.epochs} epochs"))

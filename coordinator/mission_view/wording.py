@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from swarm.model import TaskId
 from swarm.model.ids import FLEET
 from swarm.protocol.board import claim_strength
-from swarm.protocol.calibration import AS_BRIEFED, FlightRates
+from swarm.protocol.calibration import FlightRates
 from swarm.protocol.field_messages import ZoneEdit
 from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEdit, TaskEntry
 from swarm.protocol.operator_commands import describe_command
@@ -140,7 +140,7 @@ def visit_in_words(claim: Claim, before: Claim | None) -> str | None:
 
 def rates_in_words(rates: FlightRates) -> str:
     """How a UAV flies, by what was measured, beside what the mission says of it."""
-    if rates == AS_BRIEFED:
+    if rates.as_briefed:
         return "flies as planned again"
     parts = []
     if rates.time_frac != 1.0:

@@ -119,7 +119,10 @@ class MissionReport:
             "value": self.value,
         }
         if result.rates:
-            flown["calibration"] = {uav: asdict(rates) for uav, rates in result.rates.items()}
+            flown["calibration"] = {
+                uav: {name: value for name, value in asdict(rates).items() if value}
+                for uav, rates in result.rates.items()
+            }
         planned = _no_plan(self.mission) if self.plan is None else plan_as_json(self.plan)
         found: dict[str, object] = _finite({**planned, **flown})
         return found

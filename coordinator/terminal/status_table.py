@@ -24,7 +24,6 @@ from coordinator.mission_view.wording import (
 )
 from coordinator.terminal.live_view import mission_title, task_counts
 from swarm.protocol.board import TaskState
-from swarm.protocol.calibration import AS_BRIEFED
 
 _MOST_LEFT_OUT = 8
 """Tasks named that are left out."""
@@ -111,7 +110,7 @@ def status_table(scene: Scene, width: int, signs: Signs) -> RenderableType:
     for edit in scene.zone_edits:
         facts.add_row("operator", _line(zone_said(edit), signs))
     for uav in scene.uavs:
-        if uav.rates != AS_BRIEFED:
+        if not uav.rates.as_briefed:
             facts.add_row("measured", _line(f"{uav.id} {rates_in_words(uav.rates)}", signs))
     parts: list[RenderableType] = [mission_title(scene, width, 1.0, signs), facts, ""]
     parts.append(_fleet(scene, signs))

@@ -1,11 +1,13 @@
 """How UAVs fly, by what they have measured in flight: whose factors count, and where they enter.
 
 **Measured**, by each agent of its own UAV (agent.core.calibration): the time of each leg over the
-predicted one, and the charge drained over what the airborne time should take. **Filtered** there by
-running medians, and **told** in the register ``uav/<id>/calibration`` when an estimate has changed
-by a fiftieth, so that faultless flights say nothing. **Entering** here alone: the board's problems
-have the times of each UAV's legs and its airborne time by these factors, and so all decisions,
-limits, predictions and plans that rest on the board, wherever registers are equal.
+predicted one, the charge drained over what the airborne time should take, and how long it takes to
+land and to climb again, which no mission says and a vehicle is known for beforehand. **Filtered**
+by running medians, and **told** in the register ``uav/<id>/calibration`` when an estimate has
+changed by a fiftieth, so that faultless flights say nothing. **Entering** here alone: the board's
+problems have the times of each UAV's legs and its airborne time by these factors, those to bases
+and home with the landing and those from bases with the climb, and so all decisions, limits,
+predictions and plans that rest on the board, wherever registers are equal.
 
 Off unless the brief gives any UAV's acceleration, airspeed or endurance. What a UAV tells is
 clamped to what is believable, and changes predictions about itself only. Leaves out: service times.
@@ -27,16 +29,27 @@ TIME_FRAC_RANGE: Final = (0.5, 3.0)
 """What is believed of times of legs."""
 DRAIN_FRAC_RANGE: Final = (0.8, 3.0)
 """What is believed of batteries: that one lasts far longer than it should less than the reverse."""
+LONGEST_VERTICAL_S: Final = 300.0
+"""What is believed of landing and of climbing at most [s]."""
 
 
 @dataclass(frozen=True, slots=True)
 class FlightRates:
-    """How one UAV flies, as multiples of what the brief says."""
+    """How one UAV flies: multiples of what the brief says, and times that it leaves out."""
 
     time_frac: float = 1.0
     """Of the times of its legs."""
     drain_frac: float = 1.0
     """Of the charge that a second in the air takes."""
+    land_s: float = 0.0
+    """From above a base or its start until it has touched down [s]."""
+    climb_s: float = 0.0
+    """From a base back to where its legs begin [s]."""
+
+    @property
+    def as_briefed(self) -> bool:
+        """Whether it flies as the brief says, however long it takes down and up."""
+        return self.time_frac == 1.0 and self.drain_frac == 1.0
 
     @classmethod
     def believed(cls, told: Calibration | None) -> FlightRates:
@@ -44,7 +57,10 @@ class FlightRates:
         if told is None:
             return AS_BRIEFED
         return cls(
-            clamped(told.time_frac, TIME_FRAC_RANGE), clamped(told.drain_frac, DRAIN_FRAC_RANGE)
+            clamped(told.time_frac, TIME_FRAC_RANGE),
+            clamped(told.drain_frac, DRAIN_FRAC_RANGE),
+            min(told.land_s, LONGEST_VERTICAL_S),
+            min(told.climb_s, LONGEST_VERTICAL_S),
         )
 
 
@@ -85,8 +101,12 @@ def fleet_as_flown(fleet: Mission, rates: Mapping[str, FlightRates]) -> Mission:
 def field_as_flown(problem: FieldProblem, rates: Mapping[str, FlightRates]) -> FieldProblem:
     """``problem`` with the times and batteries that UAVs really have; the same one likewise."""
     known = [rates.get(uav, AS_BRIEFED) for uav in problem.uav_ids]
-    times = [each.time_frac for each in known]
-    return problem.calibrated(times, [each.drain_frac for each in known])
+    return problem.calibrated(
+        [each.time_frac for each in known],
+        [each.drain_frac for each in known],
+        [each.land_s for each in known],
+        [each.climb_s for each in known],
+    )
 
 
 def _as_flown(uav: Uav, rates: FlightRates) -> Uav:

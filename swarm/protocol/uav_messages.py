@@ -233,6 +233,10 @@ class Calibration(Checked):
     """Of the charge that a second in the air takes: 1.25 is empty a fifth earlier."""
     legs: Count
     """How many legs that rests on."""
+    land_s: Duration = 0.0
+    """From above a base or its start, in its layer, until it has touched down [s]."""
+    climb_s: Duration = 0.0
+    """From a base back to its layer, at rest there [s]."""
 
 
 class StatusPhase(StrEnum):

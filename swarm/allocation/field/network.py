@@ -107,27 +107,55 @@ class FieldNetwork:
         self.home_s, self.home = self._homes(len(mission.bases))
         self.time_frac: FloatArray = np.ones(len(uavs))
         """(n_uav,) multiples of these times that are in the tables."""
+        self.land_s: FloatArray = np.zeros(len(uavs))
+        """(n_uav,) landings that are in the times of legs to starts and bases [s]."""
+        self.climb_s: FloatArray = np.zeros(len(uavs))
+        """(n_uav,) climbs that are in the times of legs from bases [s]."""
+        self._n_home = len(uavs) + len(mission.bases)
 
-    def calibrated(self, time_frac: Sequence[float] | FloatArray) -> FieldNetwork:
+    def calibrated(
+        self,
+        time_frac: Sequence[float] | FloatArray,
+        land_s: Sequence[float] | FloatArray | None = None,
+        climb_s: Sequence[float] | FloatArray | None = None,
+    ) -> FieldNetwork:
         """The same where legs and lines of each UAV take so many times as long.
+
+        Legs to starts and bases end on the ground, those from bases begin there: these take so
+        much longer. From a base to itself nobody flies.
 
         Whatever fits no more, as UAVs that flew alike no longer do, stays as it is.
 
         Args:
             time_frac: (n_uav,) multiples of the times here; > 0.
+            land_s: (n_uav,) more to starts and bases [s]; when None, nothing.
+            climb_s: (n_uav,) more from bases [s]; when None, nothing.
         """
         fracs = np.asarray(time_frac, dtype=np.float64)
-        pairs = list(zip(self.kind.tolist(), fracs.tolist(), strict=True))
-        kinds = {pair: row for row, pair in enumerate(dict.fromkeys(pairs))}
-        if (fracs == 1.0).all() or len(kinds) * len(self.node_enu_m) ** 2 > MOST_LEGS:
+        down_s, up_s = (
+            np.zeros(len(fracs)) if each is None else np.asarray(each, dtype=np.float64)
+            for each in (land_s, climb_s)
+        )
+        flown = zip(self.kind.tolist(), fracs.tolist(), down_s.tolist(), up_s.tolist(), strict=True)
+        ways = list(flown)
+        kinds = {way: row for row, way in enumerate(dict.fromkeys(ways))}
+        alike = (fracs == 1.0).all() and not (down_s.any() or up_s.any())
+        if alike or len(kinds) * len(self.node_enu_m) ** 2 > MOST_LEGS:
             return self
         same = copy.copy(self)
-        rows, each = (np.array(column) for column in zip(*kinds, strict=True))
-        same.kind = np.array([kinds[pair] for pair in pairs], dtype=np.int32)
+        before, each, down, up = (np.array(column) for column in zip(*kinds, strict=True))
+        rows = before.astype(np.int32)
+        same.kind = np.array([kinds[way] for way in ways], dtype=np.int32)
         same.leg_s = self.leg_s[rows] * each[:, None, None]
         same.line_s = self.line_s[rows] * each[:, None, None]
-        same.home_s = self.home_s * fracs[:, None]
+        same.home_s = self.home_s * fracs[:, None] + down_s[:, None]
+        bases = range(len(self.kind), self._n_home)
+        same.leg_s[:, :, : self._n_home] += down[:, None, None]
+        same.leg_s[:, bases, :] += up[:, None, None]
+        same.leg_s[:, bases, bases] = self.leg_s[rows][:, bases, bases] * each[:, None]
         same.time_frac = self.time_frac * fracs
+        same.land_s = self.land_s + down_s
+        same.climb_s = self.climb_s + up_s
         same._kinds = [self._kinds[row] for row in rows.tolist()]  # noqa: SLF001 -- its own copy
         return same
 
@@ -145,6 +173,7 @@ class FieldNetwork:
         place_m, low_m, high_m = self._placed(uav, place_enu_m, flown_m)
         times_s: FloatArray = network.legs_from(place_m, low_m, high_m).times_s(model)[0]
         flown_s: FloatArray = times_s * self.time_frac[uav]
+        flown_s[: self._n_home] += self.land_s[uav]
         return flown_s
 
     def corners_m(self, uav: int, begin: int, end: int) -> FloatArray | None:

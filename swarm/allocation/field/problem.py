@@ -186,16 +186,25 @@ class FieldProblem:
             network=network,
         )
 
-    def calibrated(self, time_frac: Sequence[float], drain_frac: Sequence[float]) -> FieldProblem:
+    def calibrated(
+        self,
+        time_frac: Sequence[float],
+        drain_frac: Sequence[float],
+        land_s: Sequence[float] | None = None,
+        climb_s: Sequence[float] | None = None,
+    ) -> FieldProblem:
         """The same for UAVs that fly otherwise than planned; itself if none does.
 
         Args:
             time_frac: (n_uav,) multiples of the times of legs and lines; > 0.
             drain_frac: (n_uav,) multiples of the charge that a second in the air takes; > 0.
+            land_s: (n_uav,) of every leg to a base or a start, its landing [s]; when None, 0.
+            climb_s: (n_uav,) of every leg from a base, what comes before it [s]; when None, 0.
         """
-        if all(frac == 1.0 for frac in (*time_frac, *drain_frac)):
+        upright_s = (*(land_s or ()), *(climb_s or ()))
+        if all(frac == 1.0 for frac in (*time_frac, *drain_frac)) and not any(upright_s):
             return self
-        network = self._known_network().calibrated(time_frac)
+        network = self._known_network().calibrated(time_frac, land_s, climb_s)
         drain = np.asarray(drain_frac, dtype=np.float64)
         return replace(
             self,
@@ -207,6 +216,11 @@ class FieldProblem:
             full_s=self.full_s / drain,
             network=network,
         )
+
+    def land_s(self, uav: int, node: int) -> float:
+        """Of the time of a leg to ``node``, its landing [s]."""
+        at_home = node < self.n_uav + self.n_base
+        return float(self.network.land_s[uav]) if at_home and self.network is not None else 0.0
 
     @property
     def n_uav(self) -> int:

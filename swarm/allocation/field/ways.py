@@ -31,11 +31,13 @@ class Way:
     base: BaseId | None
     """Which base that is; None: a start or a task."""
     duration_s: float
-    """Time of the leg [s]."""
+    """Time of the leg, with the landing where it ends on the ground [s]."""
     via_enu_m: tuple[PointEnu, ...]
     """Corners on the way, flown through without stopping [m; east, north, up]."""
     end_enu_m: PointEnu
     """Where it ends [m; alike]."""
+    upright_s: float = 0.0
+    """Of its time, how long landing takes, and climbing before it [s]."""
 
 
 def way_to(problem: FieldProblem, uav: int, place_enu_m: Sequence[float], node: int) -> Way | None:
@@ -60,6 +62,7 @@ def way_to(problem: FieldProblem, uav: int, place_enu_m: Sequence[float], node: 
         duration_s=duration_s,
         via_enu_m=tuple(points[1:-1]),
         end_enu_m=points[-1],
+        upright_s=problem.land_s(uav, node),
     )
 
 
