@@ -16,7 +16,7 @@ import typer
 from coordinator.planner.options import method_names, online_method_names
 from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.protocol.timing import Timing
-from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.errors import EXIT_INTERRUPTED, Fault, InputError
 from swarm.runtime.log import LogFormat, LogLevel
 from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import (
@@ -43,6 +43,8 @@ if TYPE_CHECKING:
     from swarm.model import Mission, Plan
     from swarm.protocol.messages import Snapshot
     from swarm.runtime.store import Store
+
+_USUAL_FIRMWARE = "ardupilot"
 
 
 def plan(
@@ -78,7 +80,7 @@ def plan(
     firmware: Annotated[
         str,
         typer.Option(metavar="ardupilot|px4", help="What the exported plans are to be flown by."),
-    ] = "ardupilot",
+    ] = _USUAL_FIRMWARE,
     bound: Annotated[
         bool,
         typer.Option(
@@ -108,14 +110,12 @@ def plan(
 
     from json import dumps
 
-    from coordinator.core.publication import height_warning
-    from coordinator.export import require_origin
+    from coordinator.core.heights import height_warning
     from coordinator.planner.exact import ProblemTooLargeError
     from coordinator.planner.options import BOUND_S, after_time, bound_frac, first_of
     from coordinator.planner.plan import make_plan
     from coordinator.planner.plan_report import plan_as_json, plan_table
     from swarm.model.layers import FlightLayers
-    from swarm.runtime.process import EXIT_INTERRUPTED
     from swarm.scenario import load_scenario, require_plain
 
     _check_plan_options(method, plot, firmware)
@@ -123,6 +123,8 @@ def plan(
     if (warning := height_warning(mission, FlightLayers())) is not None:
         print(f"warning: {warning}", file=sys.stderr)
     if export is not None:
+        from coordinator.export import require_origin
+
         require_plain(mission, "swarm plan --export")
         require_origin(mission, str(scenario))
     try:
@@ -309,7 +311,8 @@ def coordinator(
         swarm coordinator valley-survey --dashboard 8080
     """
     from coordinator.core.active import CoordinatorCore
-    from coordinator.core.publication import height_warning, unsayable
+    from coordinator.core.heights import height_warning
+    from coordinator.core.publication import unsayable
     from coordinator.daemon import CoordinatorProcess
     from coordinator.dashboard.access import parse_serve_address
     from coordinator.dashboard.supervisor import supervised_dashboard
@@ -435,25 +438,37 @@ async def _work(
 
 def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
     """Refuse what cannot be done before any work is done."""
-    from coordinator.export import ExportFirmware
-    from coordinator.plot import PLOT_SUFFIXES
     from swarm.runtime.errors import remedy_for_name
-    from swarm.runtime.extras import require_extra
 
     faults = []
     methods = method_names()
     if method not in methods:
         remedy = remedy_for_name(method, methods)
         faults.append(Fault("--method", method, "no such method", remedy))
-    if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
-        problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
-        remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"
-        faults.append(Fault("--plot", str(plot), problem, remedy))
-    elif plot is not None:
+    if plot is not None:
+        faults += _plot_faults(plot)
+    if firmware != _USUAL_FIRMWARE:
+        faults += _firmware_faults(firmware)
+    if faults:
+        raise InputError(*faults)
+
+
+def _plot_faults(plot: Path) -> Iterator[Fault]:
+    from coordinator.plot import PLOT_SUFFIXES
+    from swarm.runtime.extras import require_extra
+
+    if plot.suffix.lower() in PLOT_SUFFIXES:
         require_extra("ground", "--plot")
+        return
+    problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
+    yield Fault("--plot", str(plot), problem, f"end it in {', '.join(PLOT_SUFFIXES)}")
+
+
+def _firmware_faults(firmware: str) -> Iterator[Fault]:
+    from coordinator.export import ExportFirmware
+    from swarm.runtime.errors import remedy_for_name
+
     firmwares = [known.value for known in ExportFirmware]
     if firmware not in firmwares:
         remedy = remedy_for_name(firmware, firmwares)
-        faults.append(Fault("--firmware", firmware, "no such firmware", remedy))
-    if faults:
-        raise InputError(*faults)
+        yield Fault("--firmware", firmware, "no such firmware", remedy)

@@ -37,10 +37,6 @@ from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 
-HIGHEST_M = 120.0
-"""Above it unmanned aircraft need a permit of their own in the EU, Britain and Switzerland; 122 m
-(400 ft) in the USA."""
-
 
 def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> MissionConfig:
     """What the agents need to know of ``mission``."""
@@ -81,20 +77,6 @@ def _shares_of(uav: Uav) -> dict[str, float]:
     if uav.endurance_s is None:
         return {}
     return {"reserve_frac": uav.reserve_frac, "charge_frac": uav.charge_frac}
-
-
-def height_warning(mission: Mission, layers: FlightLayers) -> str | None:
-    """What to say of layers that reach too high, and what to do; None if they do not."""
-    count = len(mission.uavs)
-    above = sum(layers.layer_m(index) > HIGHEST_M for index in range(count))
-    if not above:
-        return None
-    who = "1 UAV flies" if above == 1 else f"{above} UAVs fly"
-    return (
-        f"the highest of {count} height layers is {layers.layer_m(count - 1):g} m up, and {who} "
-        f"above {HIGHEST_M:g} m, which many countries forbid: fly fewer UAVs, or let swarm "
-        "coordinator lower --layer-spacing-m or --lowest-layer-m"
-    )
 
 
 def unsayable(mission: Mission, layers: FlightLayers) -> list[str]:

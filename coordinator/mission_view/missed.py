@@ -12,8 +12,6 @@ from dataclasses import replace
 import numpy as np
 
 from coordinator.mission_view.results import MissionResult
-from swarm.allocation.field import FieldProblem, FieldState
-from swarm.kernels.field_alone import earliest_alone
 from swarm.model import Mission, Task, TaskId
 from swarm.model.mission import PLAIN_CONSTRAINTS
 
@@ -38,6 +36,9 @@ def able_alone(mission: Mission, tasks: Iterable[Task]) -> Collection[TaskId]:
     known = [replace(task, opens_s=max(task.opens_s, task.appears_s)) for task in tasks]
     if PLAIN_CONSTRAINTS.issuperset(mission.constraints):  # tables of legs may be large
         return {task.id for task in known if any(mission.success(u, task) for u in mission.uavs)}
+    from swarm.allocation.field import FieldProblem, FieldState  # plain missions never load it
+    from swarm.kernels.field_alone import earliest_alone
+
     problem = FieldProblem.from_mission(mission, tasks=known)
     can = np.isfinite(earliest_alone(problem.kernel, FieldState.at_start(problem)))
     return {known[column].id for column in np.flatnonzero(can.any(axis=0)).tolist()}

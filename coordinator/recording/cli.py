@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
-from swarm.runtime.errors import Fault, InputError
+from swarm.runtime.errors import EXIT_INTERRUPTED, Fault, InputError
 from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import JsonOption, SomeMissionOption, SpeedupOption
 
@@ -75,7 +75,7 @@ def record(
     from coordinator.recording.recorder import RecordingInfo, RecordingObserver
     from swarm.runtime.clock import ScaledClock
     from swarm.runtime.log import LogLevel, configure_logging
-    from swarm.runtime.process import EXIT_INTERRUPTED, run_until_stopped
+    from swarm.runtime.process import run_until_stopped
 
     configure_logging(LogLevel.ERROR)
     check_mission(mission)
@@ -251,7 +251,7 @@ def _play(playback: Playback, port: int, *, json: bool, browser: bool) -> int:
     from coordinator.recording.player import RecordingPlayer
     from swarm.runtime.clock import SystemClock
     from swarm.runtime.log import LogLevel, configure_logging
-    from swarm.runtime.process import EXIT_INTERRUPTED, run_until_stopped
+    from swarm.runtime.process import run_until_stopped
 
     configure_logging(LogLevel.WARNING)
     host = "127.0.0.1"

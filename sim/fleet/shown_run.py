@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Self, TextIO
 
 from rich.console import Console
 
-from coordinator.core.publication import height_warning
+from coordinator.core.heights import height_warning
 from coordinator.terminal.live_view import LiveView
 from coordinator.terminal.report import MissionReport
 from sim.fleet.layout import LaunchOptions

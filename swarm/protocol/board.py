@@ -11,11 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from enum import StrEnum
 from itertools import islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from swarm.allocation.field import FieldProblem
-from swarm.allocation.field.recent import problem_of
 from swarm.allocation.lower_level import Rule, TeamState
 from swarm.allocation.problem import BoolArray, Problem
 from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
@@ -33,6 +32,9 @@ from swarm.protocol.messages import MissionConfig, PostedTask, TaskEntry, UavSpe
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase
+
+if TYPE_CHECKING:
+    from swarm.allocation.field import FieldProblem
 
 _UNLIMITED = FIELD_DEFAULTS[TaskEntry]
 """Of a task of which a plain problem tells all."""
@@ -200,6 +202,8 @@ class TaskBoard:
         limited = not self._limited.isdisjoint(task.id for task in tasks)
         if not (limited or zones_in_force(self.replica) or is_of_field(fleet)):
             return None
+        from swarm.allocation.field.recent import problem_of  # plain missions never load it
+
         mission = self.mission
         layers_m = [uav.layer_m for uav in brief.uavs]
         return None if mission is None else problem_of(mission, layers_m)

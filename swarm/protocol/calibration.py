@@ -17,13 +17,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
-from swarm.allocation.field import FieldProblem
 from swarm.model import Mission, Uav
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import Calibration
+
+if TYPE_CHECKING:
+    from swarm.allocation.field import FieldProblem
 
 TIME_FRAC_RANGE: Final = (0.5, 3.0)
 """What is believed of times of legs."""

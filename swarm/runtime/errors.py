@@ -9,6 +9,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from difflib import get_close_matches
 
+EXIT_INTERRUPTED = 130
+"""Status after SIGINT, as shells have it: 128 + 2."""
+
 
 class SwarmError(Exception):
     """Base of all errors raised on purpose by this project."""

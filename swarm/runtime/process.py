@@ -18,6 +18,8 @@ from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from concurrent.futures import Future
 from typing import Any, Final, NoReturn, TypeVar
 
+from swarm.runtime.errors import EXIT_INTERRUPTED
+
 STDIN_FD = 0
 CHUNK_BYTES = 4096
 
@@ -156,8 +158,6 @@ T = TypeVar("T")
 
 EXIT_STOPPED = 0
 """Status after SIGTERM or the end of the lifeline: the daemon did what it was told."""
-EXIT_INTERRUPTED = 130
-"""Status after SIGINT, as shells have it: 128 + 2."""
 
 INSIST_AFTER_S = 1.0
 """A second SIGINT kills from this long after the first: sooner it is likely the same Ctrl-C,

@@ -1,9 +1,16 @@
-"""Scenario files: TOML in, a validated mission out, one clear line per fault."""
+"""Scenario files: TOML in, a validated mission out, one clear line per fault.
 
-from swarm.scenario.files import resolve_scenario, shipped_scenarios
-from swarm.scenario.plain import require_plain
-from swarm.scenario.read import load_scenario, parse_scenario
-from swarm.scenario.write import format_scenario
+Everything is imported when it is first used: a process that only names scenarios reads none.
+"""
+
+from __future__ import annotations
+
+TYPE_CHECKING = False  # as typing has it, which everybody would have to import for it
+if TYPE_CHECKING:
+    from swarm.scenario.files import resolve_scenario, shipped_scenarios
+    from swarm.scenario.plain import require_plain
+    from swarm.scenario.read import load_scenario, parse_scenario
+    from swarm.scenario.write import format_scenario
 
 __all__ = [
     "format_scenario",
@@ -13,3 +20,24 @@ __all__ = [
     "resolve_scenario",
     "shipped_scenarios",
 ]
+
+_WHERE = {
+    "swarm.scenario.files": ("resolve_scenario", "shipped_scenarios"),
+    "swarm.scenario.plain": ("require_plain",),
+    "swarm.scenario.read": ("load_scenario", "parse_scenario"),
+    "swarm.scenario.write": ("format_scenario",),
+}
+
+
+if not TYPE_CHECKING:  # a type checker must know no other name
+
+    def __getattr__(name: str) -> object:
+        """Import what is asked for, once."""
+        from importlib import import_module
+
+        for module, names in _WHERE.items():
+            if name in names:
+                found: object = getattr(import_module(module), name)
+                globals()[name] = found
+                return found
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

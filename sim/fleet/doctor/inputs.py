@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from coordinator.core.publication import height_warning
+from coordinator.core.heights import height_warning
 from sim.fleet.doctor.field import check_field
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 from swarm.identity import Identity, Role, load_identity

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from coordinator.core.publication import height_warning
+from coordinator.core.heights import height_warning
 from swarm.cli import main
 from swarm.model import Mission, Uav, UavId
 from swarm.model.layers import FlightLayers
