@@ -13,7 +13,7 @@ from typing import Final
 import agent.core.decision
 import swarm.protocol.board
 import swarm.protocol.registers
-from agent.core.calibration import FlightMeter
+from agent.core.calibration import FlightMeter, RunningMedian
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import Message
 from swarm.protocol.uav_messages import Claim, ClaimPhase
@@ -63,12 +63,19 @@ def _suspect_without_link() -> AbstractContextManager[None]:
 
 
 @contextmanager
-def _measure_wrongly(which: int, frac: float) -> Iterator[None]:
-    """Agents measure so many times what is true: of times of legs (0) or of drain (1)."""
-    vote = FlightMeter._vote  # noqa: SLF001 - where both kinds of measurements enter
+def _measure_wrongly(which: str, frac: float) -> Iterator[None]:
+    """Agents measure so many times what is true: of ``times`` of legs or of ``drains``."""
+    vote = FlightMeter._vote  # noqa: SLF001 - where all kinds of measurements enter
 
-    def wrongly(self: FlightMeter, kind: int, measured: float, now_s: float) -> bool:
-        return vote(self, kind, measured * (frac if kind == which else 1.0), now_s)
+    def wrongly(
+        self: FlightMeter,
+        medians: RunningMedian,
+        measured: float,
+        within: tuple[float, float],
+        now_s: float,
+    ) -> bool:
+        errs = medians is getattr(self._medians, which)  # noqa: SLF001
+        return vote(self, medians, measured * (frac if errs else 1.0), within, now_s)
 
     with _patched(FlightMeter, "_vote", wrongly):
         yield
@@ -78,8 +85,8 @@ BUGS: Final[dict[str, Callable[[], AbstractContextManager[None]]]] = {
     "ignore-incarnations": _ignore_incarnations,
     "proposed-beats-held": _proposed_beats_held,
     "suspect-without-link": _suspect_without_link,
-    "times-mismeasured": partial(_measure_wrongly, 0, 2.0),
-    "drain-mismeasured": partial(_measure_wrongly, 1, 1.3),
+    "times-mismeasured": partial(_measure_wrongly, "times", 2.0),
+    "drain-mismeasured": partial(_measure_wrongly, "drains", 1.3),
 }
 """By name."""
 FIELD_BUGS: Final = frozenset({"times-mismeasured", "drain-mismeasured"})
