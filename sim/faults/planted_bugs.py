@@ -74,7 +74,7 @@ def _measure_wrongly(which: str, frac: float) -> Iterator[None]:
         within: tuple[float, float],
         now_s: float,
     ) -> bool:
-        errs = medians is getattr(self._medians, which)  # noqa: SLF001
+        errs = medians is getattr(self._medians, which)
         return vote(self, medians, measured * (frac if errs else 1.0), within, now_s)
 
     with _patched(FlightMeter, "_vote", wrongly):
