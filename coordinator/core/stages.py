@@ -12,6 +12,7 @@ the situation of now, so a reason that comes at a bad moment is not forgotten.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
@@ -257,7 +258,10 @@ class StagedMission:
         actions += self._enter(MissionStage.RUNNING, now_s)
         self._announcer.set_zero(now_s)
         actions.append(self._announcer.say(self.gate.epoch(MissionPhase.RUNNING, self.gate.reason)))
-        self.replan_policy.begin(self._situation(now_s), self.gate.completion_s, now_s)
+        situation = self._situation(now_s)
+        if situation is not None:  # the plan was made as the brief has it
+            situation = replace(situation, rates=())
+        self.replan_policy.begin(situation, self.gate.completion_s, now_s)
         return actions
 
     def _leave_when_empty(self, now_s: float) -> list[CoordinatorAction]:
@@ -434,6 +438,10 @@ class ReplanPolicy:
         return float(np.mean(late_s)) / left_s if late_s else 0.0
 
 
+_UPRIGHT_S = 5.0
+"""Of landing and climbing together, that is noticeable [s]."""
+
+
 def _calibrated(before: Situation, now: Situation) -> list[str]:
     """UAVs that have measured that they fly noticeably otherwise than was known."""
     known, found = dict(before.rates), dict(now.rates)
@@ -443,4 +451,5 @@ def _calibrated(before: Situation, now: Situation) -> list[str]:
         for old, new in [(known.get(uav, AS_BRIEFED), found.get(uav, AS_BRIEFED))]
         if abs(new.time_frac / old.time_frac - 1.0) > DRIFT_FRAC
         or abs(new.drain_frac / old.drain_frac - 1.0) > DRIFT_FRAC
+        or abs(new.land_s + new.climb_s - old.land_s - old.climb_s) > _UPRIGHT_S
     ]

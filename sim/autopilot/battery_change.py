@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.pilot import Pilot
 
-_NEAR_M = 5.0
-"""Who stands no farther from a base than this, seen from above, is served there [m]."""
+_NEAR_M = 60.0
+"""Who stands no farther from a base than this, seen from above, is served there [m]: the UAVs of
+a fleet land on spots of their own round it."""
 _LEAST_STAND_S = 2.0
 """So long motors have stood, at least, before anybody takes the battery out [s]."""
 
