@@ -31,7 +31,7 @@ def pasture() -> Mission:
             10.0,
             acceleration_m_s2=2.5,
             endurance_s=180.0,
-            reserve_frac=0.4,
+            reserve_frac=0.2,
         )
         for number in range(2)
     ]
