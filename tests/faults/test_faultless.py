@@ -2,12 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
+from sim.world.simulation import simulate_mission
+from sim.world.uncertainty import Uncertainty
 from tests.support.builders import with_accelerations
+from tests.support.field_missions import mission_of
+from tests.support.field_oracle.made_up import KINDS, made_up
 from tests.support.fleet_builders import WatchedWorld, plan_for, random_mission
 from tests.support.seeds import seeds
+
+WITHOUT_SLOTS = tuple(kind for kind in KINDS if kind != "slots")
+"""Plans let nobody wait on the ground for a slot; there more can be done than was planned."""
 
 
 @pytest.mark.parametrize("seed", seeds(40, 200))
@@ -47,3 +56,28 @@ def executed_lists_equal_the_offline_plan(
     assert set(result.done) == {task.id for task in mission.tasks}
     assert (result.duplicate_visits, result.open, result.lost_uavs) == (0, (), ())
     assert world.finished == dict.fromkeys(["coordinator", *(u.id for u in mission.uavs)], 0)
+
+
+@pytest.mark.parametrize("method", ["greedy", "lookahead", "guided"])
+@pytest.mark.parametrize("kind", WITHOUT_SLOTS)
+@pytest.mark.parametrize("seed", seeds(1, 12))
+def test_lists_of_the_field_are_executed_as_planned(seed: int, kind: str, method: str) -> None:
+    mission = replace(mission_of(made_up(seed, kind, 3, 5)), schema=2).known_at_start()
+    flown = simulate_mission(mission, method=method, seed=seed, uncertainty=Uncertainty())
+
+    plan = flown.world.mission_state.plan
+    assert plan is not None
+    assert flown.result.executed_routes == plan.routes
+    assert flown.result.executed_completion_s == pytest.approx(plan.completion_s, abs=1e-6)
+
+
+@pytest.mark.parametrize("method", ["greedy", "lookahead", "guided"])
+@pytest.mark.parametrize("seed", seeds(3, 12))
+def test_where_uavs_wait_for_slots_all_that_is_planned_is_done(seed: int, method: str) -> None:
+    """Who has nothing to do lands beside the slots, gets a battery there, and may do more."""
+    mission = replace(mission_of(made_up(seed, "slots", 3, 5)), schema=2).known_at_start()
+    flown = simulate_mission(mission, method=method, seed=seed, uncertainty=Uncertainty())
+
+    plan = flown.world.mission_state.plan
+    assert plan is not None
+    assert {task for route in plan.routes.values() for task in route} <= set(flown.result.done)
