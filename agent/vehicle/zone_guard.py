@@ -24,7 +24,8 @@ if TYPE_CHECKING:
 FloatArray = npt.NDArray[np.float64]
 
 _ASIDE_M = 1.0
-"""So much nearer than the margin a way may come: nothing hovers quite where it was told."""
+"""So much nearer than the margin a way that is ordered may come: nothing hovers quite where it
+was told. The bends at its corners are the bridge's own choice, and keep all of it."""
 
 _STEP_M = 0.5
 """Places are looked at that far apart on a way out."""
@@ -46,6 +47,7 @@ class ZoneGuard:
             from swarm.allocation.legs.obstacles import Obstacles
         near_m = max(0.0, margin_m - _ASIDE_M)
         self._zones = [(zone, Obstacles([zone], near_m)) for zone in zones]
+        self._margins = [(zone, Obstacles([zone], margin_m)) for zone in zones]
 
     def __bool__(self) -> bool:
         return bool(self._zones)
@@ -67,7 +69,7 @@ class ZoneGuard:
         return None
 
     def clear(self, path_enu_m: Sequence[Point]) -> bool:
-        """Whether no piece of that path meets a zone."""
+        """Whether no piece of that path meets a zone, or its margin."""
         if not self._zones:
             return True
         places_m = np.array([place[:2] for place in path_enu_m])
@@ -75,7 +77,7 @@ class ZoneGuard:
         low_m, high_m = min(heights_m), max(heights_m)
         return all(
             bool(obstacles.clear(places_m[:-1], places_m[1:]).all())
-            for zone, obstacles in self._zones
+            for zone, obstacles in self._margins
             if zone.concerns(low_m, high_m)
         )
 

@@ -51,7 +51,7 @@ def test_a_path_is_flown_round_its_corners_without_a_stop(flight: BridgeFlight) 
 
     way = ((5.0, 0.0, 10.0), *ROUND, BEHIND)
     length_m = sum(math.dist(a, b) for a, b in pairwise(way))
-    assert closest_m(flight) >= 2.0
+    assert closest_m(flight) >= 3.0 - 0.05  # of bends, too, the margin is kept
     assert flight.now_s - begun_s <= length_m / 4.0 + 5.0
     for corner in ROUND:
         nearest_m = min(math.dist(corner, each.position_enu_m) for each in flight.telemetry)
@@ -99,7 +99,7 @@ def test_a_path_is_replaced_by_another_in_the_middle_of_it(flight: BridgeFlight)
     flight.run_until(Arrived(2), limit_s=120.0)
 
     assert Arrived(1) not in flight.reports
-    assert closest_m(flight) >= 2.0
+    assert closest_m(flight) >= 3.0 - 0.05  # of bends, too, the margin is kept
 
 
 def test_it_comes_home_round_a_zone_and_lands_there(flight: BridgeFlight) -> None:
@@ -110,7 +110,7 @@ def test_it_comes_home_round_a_zone_and_lands_there(flight: BridgeFlight) -> Non
     flight.order(Return("over", via_enu_m=(4.0, 2.0, 10.0), path_enu_m=ROUND[::-1], land=True))
     flight.run_until(Home, limit_s=180.0)
 
-    assert closest_m(flight) >= 2.0
+    assert closest_m(flight) >= 3.0 - 0.05  # of bends, too, the margin is kept
     assert flight.copter.position_m == pytest.approx((4.0, 2.0, 0.0), abs=1.5)
 
 
@@ -122,7 +122,7 @@ def test_where_a_zone_lies_between_it_and_home_it_lands_where_it_is(flight: Brid
     flight.order(Return("its battery is low"))
     flight.run_until(Home, limit_s=180.0)
 
-    assert closest_m(flight) >= 2.0
+    assert closest_m(flight) >= 3.0 - 0.05  # of bends, too, the margin is kept
     assert flight.copter.position_m == pytest.approx((*BEHIND[:2], 0.0), abs=1.5)
 
 
