@@ -18,6 +18,7 @@ from agent.core.interface import (
     VehicleReady,
 )
 from agent.core.states import AgentState
+from agent.core.verticals import Verticals
 from swarm.allocation.field import FieldProblem
 from swarm.allocation.field.ways import base_node, task_nodes
 from swarm.model import BaseId, TaskId, UavId
@@ -109,6 +110,7 @@ class FieldAgent(LoneAgent):
         now_s: float = 100.0,
         memory: Snapshot | None = None,
         memory_age_s: float = 0.0,
+        verticals: Verticals | None = None,
     ) -> None:
         fleet = (uav("u0"), *(uav(name, 10.0) for name in others))
         self._given = others, timing
@@ -119,6 +121,7 @@ class FieldAgent(LoneAgent):
             now_s=now_s,
             memory=memory,
             memory_age_s=memory_age_s,
+            verticals=verticals,
         )
         specs = tuple(replace(spec, endurance_s=endurance_s) for spec in self.brief.uavs)
         self.brief = replace(self.brief, uavs=specs, bases=tuple(bases), zones=tuple(zones))

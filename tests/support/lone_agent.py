@@ -18,6 +18,7 @@ from agent.core.interface import (
     VehicleOrder,
     VehicleReady,
 )
+from agent.core.verticals import Verticals
 from swarm.model import Uav
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import (
@@ -63,6 +64,7 @@ class LoneAgent:
         memory_age_s: float = 0.0,
         rejoin: bool = False,
         without_bus_s: float | None = None,
+        verticals: Verticals | None = None,
     ) -> None:
         self.uavs = uavs
         self.me = uavs[0].id
@@ -75,6 +77,7 @@ class LoneAgent:
             memory_age_s,
             rejoin=rejoin,
             without_bus_s=without_bus_s,
+            verticals=verticals,
         )
         self.timing = timing
         self.now_s = now_s

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarm.allocation.field.ways import way_to
 from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskBoard
@@ -82,6 +83,39 @@ def test_legs_and_batteries_follow_in_the_field() -> None:
         np.testing.assert_array_equal(here, before.legs_from_s(uav, (3.0, 4.0, 0.0)) * frac)
     np.testing.assert_array_equal(after.full_s, before.full_s / [1.0, 1.5])
     np.testing.assert_array_equal(after.first_s, before.first_s / [1.0, 1.5])
+
+
+def test_legs_that_end_or_begin_on_the_ground_take_longer_by_landing_and_climbing() -> None:
+    told = Board(IN_FIELD)
+    before = told.board.field_problem
+    told.say("u1", Calibration(1.25, 1.0, 0, 20.0, 7.0))
+    after = told.board.field_problem
+
+    assert before is not None
+    assert after is not None
+    np.testing.assert_array_equal(after.leg_s[after.kind[0]], before.leg_s[before.kind[0]])
+    old, new = before.leg_s[before.kind[1]] * 1.25, after.leg_s[after.kind[1]]
+    start, base, near, far = 1, 2, 3, 4
+    assert new[near, far] == old[near, far]
+    assert new[near, base] == old[near, base] + 20.0
+    assert new[near, start] == old[near, start] + 20.0
+    assert new[base, far] == old[base, far] + 7.0
+    assert new[base, base] == 0.0  # there it stands already
+    np.testing.assert_array_equal(after.home_s[1], before.home_s[1] * 1.25 + 20.0)
+    here = after.legs_from_s(1, (3.0, 4.0, 0.0)) - 1.25 * before.legs_from_s(1, (3.0, 4.0, 0.0))
+    np.testing.assert_allclose(here, [20.0, 20.0, 20.0, 0.0, 0.0], atol=1e-9)
+    assert after.land_s(1, base) == 20.0
+    assert after.land_s(1, near) == after.land_s(0, base) == 0.0
+    way = way_to(after, 1, (3.0, 4.0, 0.0), base)
+    assert way is not None
+    assert way.upright_s == 20.0
+    np.testing.assert_array_equal(after.full_s, before.full_s)  # the tables hold it
+
+
+def test_who_takes_no_time_to_land_says_what_every_release_understands() -> None:
+    plain = encode(message("u0", Calibration(1.2, 1.1, 5)))
+    assert b"land_s" not in plain
+    assert len(plain) < len(encode(message("u0", Calibration(1.2, 1.1, 5, 20.0, 7.0))))
 
 
 @pytest.mark.parametrize("mission", [FLIGHT, IN_FIELD])
