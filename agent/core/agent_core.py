@@ -12,10 +12,10 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
 
 from agent.core.announcer import Announcer
 from agent.core.context import AgentContext, AgentPart
-from agent.core.field_decision import FieldRuleMaker, field_rule_of
 from agent.core.field_tasking import FieldTasking
 from agent.core.interface import (
     Action,
@@ -62,6 +62,9 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import StallDetector, Timing, earliest
 from swarm.protocol.uav_messages import MOST_REASONS, Claim, ClaimPhase, Status, StatusPhase
 
+if TYPE_CHECKING:
+    from agent.core.field_decision import FieldRuleMaker
+
 IMPOSSIBLE = "impossible transition"
 """Begins the log line about a trigger that the agent's state has no transition for: a bug."""
 _MINDS_BUS_LOSS = TAKES_TASKS | PAUSED_BY_OPERATOR | {AgentState.PREPARING}
@@ -88,7 +91,8 @@ class AgentCore(AgentPart):
             to fly on.
         make_rule: what it decides by in an epoch of that rule and those routes. Every UAV of a
             fleet needs the same.
-        make_field_rule: the same where the field's constraints count.
+        make_field_rule: the same where the field's constraints count; None: the rule of the
+            epoch.
     """
 
     def __init__(
@@ -105,7 +109,7 @@ class AgentCore(AgentPart):
         make_rule: RuleMaker = rule_of,
         path_clearance_m: float = 0.0,
         verticals: Verticals | None = None,
-        make_field_rule: FieldRuleMaker = field_rule_of,
+        make_field_rule: FieldRuleMaker | None = None,
     ) -> None:
         self.uav = uav
         self.replica = Replica()

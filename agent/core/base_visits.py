@@ -15,7 +15,7 @@ from agent.core.context import AgentContext, AgentPart
 from agent.core.energy import SortieClock
 from agent.core.flights import Flights
 from agent.core.states import AT_BASE, VISITS_BASE, AgentState, Trigger
-from swarm.allocation.field.ways import Way
+from swarm.allocation import field
 from swarm.protocol import bases
 from swarm.protocol.field_messages import BaseSpec
 from swarm.protocol.messages import Stamp
@@ -156,7 +156,7 @@ class BaseVisits(AgentPart):
 
     def set_off(
         self,
-        way: Way,
+        way: field.Way,
         base: str,
         since_s: float,
         rank: int,
@@ -271,7 +271,7 @@ class BaseVisits(AgentPart):
         self._become_free(self._mission_view.mission_s(now_s), True)
         self._log("released", base=claim.base, reason=reason)
 
-    def _fly(self, way: Way, base: str) -> None:
+    def _fly(self, way: field.Way, base: str) -> None:
         self._flights.along(way, None, 1, 0.0)
         self._announcer.explain(f"flies to base {base}")
 

@@ -9,17 +9,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from agent.core.base_visits import BaseVisits
 from agent.core.context import AgentContext
 from agent.core.decision import DecisionTurn, RefusedTasks
 from agent.core.energy import TOLERANCE_S
-from agent.core.field_decision import (
-    FieldRule,
-    FieldTurnDecision,
-    decide_in_field,
-    divert_in_field,
-)
 from agent.core.flights import HomeFlight
 from agent.core.havens import Haven, Havens
 from agent.core.states import (
@@ -32,11 +27,14 @@ from agent.core.states import (
 )
 from agent.core.tasking import Tasking
 from agent.core.time_limits import WITHOUT_AIM, TimeLimits, ends_of
-from swarm.allocation.field.ways import Way
+from swarm.allocation import field
 from swarm.protocol.board import RuleMaker, ranks, rule_of
 from swarm.protocol.messages import PlanEpoch, TaskEntry
 from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
+
+if TYPE_CHECKING:
+    from agent.core.field_decision import FieldRule, FieldTurnDecision
 
 
 class FieldTasking(Tasking):
@@ -191,6 +189,8 @@ class FieldTasking(Tasking):
         if rule is None:
             self._stay_idle(now_s)
             return
+        from agent.core.field_decision import decide_in_field  # plain missions never load it
+
         decision = decide_in_field(problem, self._mission_view.board, rule, turn)
         if decision is None or decision.base in self._refused_bases.left_alone(now_s):
             self._stay_idle(now_s)
@@ -214,6 +214,8 @@ class FieldTasking(Tasking):
         rule = self._field_rule(epoch)
         if rule is None or turn.awaited:
             return
+        from agent.core.field_decision import divert_in_field
+
         decision = divert_in_field(problem, self._mission_view.board, rule, turn)
         if decision is not None and decision.task is not None:
             self._become_free(turn.now_s)
@@ -233,7 +235,9 @@ class FieldTasking(Tasking):
 
     def _field_rule(self, epoch: PlanEpoch) -> FieldRule | None:
         """The rule in force; None, and told once, if it is not known."""
-        rule = self._make_field_rule(epoch.rule, epoch.routes)
+        from agent.core.field_decision import field_rule_of
+
+        rule = (self._make_field_rule or field_rule_of)(epoch.rule, epoch.routes)
         if rule is None and self._rule_basis != epoch.rule:
             self._rule_basis = epoch.rule
             self._announcer.explain(f"cannot decide by rule {epoch.rule}")
@@ -327,7 +331,7 @@ class FieldTasking(Tasking):
         self._say(claim)
         return True
 
-    def _fly(self, way: Way, task: TaskEntry, claim: Claim, *, idled: bool = False) -> None:
+    def _fly(self, way: field.Way, task: TaskEntry, claim: Claim, *, idled: bool = False) -> None:
         line_s = self._flights.line_s(task.task, backwards=bool(claim.reversed))
         stay_s = task.service_s if line_s == 0.0 else 0.0
         attempt = self._attempt_at(task.task)

@@ -15,8 +15,7 @@ from agent.core.calibration import FlightMeter
 from agent.core.context import AgentContext, AgentPart
 from agent.core.interface import GoTo, Ready, Return, Swap
 from agent.core.path_clearance import PathClearance
-from swarm.allocation.field import FieldProblem
-from swarm.allocation.field.ways import Way, base_node, task_nodes, way_home, way_to
+from swarm.allocation import field
 from swarm.allocation.problem import rest_to_rest_s
 from swarm.model import TaskId, UavId
 from swarm.protocol.field_messages import BaseSpec, ZoneSpec
@@ -55,7 +54,7 @@ class Flights(AgentPart):
         """Place and problem of that way home."""
         self._clearance_m = context.path_clearance_m
         self._clearance: PathClearance | None = None
-        self._clearance_of: FieldProblem | None = None
+        self._clearance_of: field.FieldProblem | None = None
         self._verticals = context.verticals
         self._spots: dict[str, Point] = {}
         """By base, where it lands."""
@@ -65,7 +64,7 @@ class Flights(AgentPart):
     # -- what is known of the field -------------------------------------------------------
 
     @property
-    def problem(self) -> FieldProblem | None:
+    def problem(self) -> field.FieldProblem | None:
         """Of a mission with the field's constraints in which this UAV is; None of a plain one."""
         problem = self._mission_view.board.field_problem
         return problem if problem is not None and self._uav in problem.uav_ids else None
@@ -119,7 +118,7 @@ class Flights(AgentPart):
         if problem is None or task not in problem.task_ids:
             return None
         column = problem.task_ids.index(TaskId(task))
-        return task_nodes(problem, column, backwards=backwards)
+        return field.task_nodes(problem, column, backwards=backwards)
 
     def line_s(self, task: str, *, backwards: bool) -> float:
         """Time along that task's line [s]; 0 of a place."""
@@ -134,17 +133,17 @@ class Flights(AgentPart):
         problem = self.problem
         return 0.0 if problem is None else float(problem.home_s[self._row(problem), node])
 
-    def way_to_task(self, task: str, *, backwards: bool) -> Way | None:
+    def way_to_task(self, task: str, *, backwards: bool) -> field.Way | None:
         """From where the UAV is to where that task begins; None: there is none."""
         nodes = self.nodes(task, backwards=backwards)
         return None if nodes is None else self._way(nodes[0])
 
-    def way_to_base(self, base: str) -> Way | None:
+    def way_to_base(self, base: str) -> field.Way | None:
         """From where the UAV is to above that base; None: there is none."""
         problem = self.problem
         if problem is None or base not in problem.base_ids:
             return None
-        return self._way(base_node(problem, base))
+        return self._way(field.base_node(problem, base))
 
     def way_home(self) -> HomeFlight | None:
         """From where the UAV is; None where that is not known, or there is none."""
@@ -152,7 +151,7 @@ class Flights(AgentPart):
         if problem is None or place_enu_m is None:
             return None
         if self._home_from != (place_enu_m, problem):
-            way = self._widened(way_home(problem, self._row(problem), place_enu_m))
+            way = self._widened(field.way_home(problem, self._row(problem), place_enu_m))
             self._home_from = place_enu_m, problem
             self._home = (
                 None
@@ -171,17 +170,17 @@ class Flights(AgentPart):
         out_m = problem.network.way_out_m(self._row(problem), place_enu_m)
         return None if out_m is None else self._mission_view.in_layer(out_m)
 
-    def _way(self, node: int) -> Way | None:
+    def _way(self, node: int) -> field.Way | None:
         problem, place_enu_m = self.problem, self._mission_view.place_enu_m
         if problem is None or place_enu_m is None:
             return None
-        way = self._widened(way_to(problem, self._row(problem), place_enu_m, node))
+        way = self._widened(field.way_to(problem, self._row(problem), place_enu_m, node))
         if way is None or not self._mission_view.stands:
             return way
         climb_s = self.climb_s
         return replace(way, duration_s=way.duration_s + climb_s, upright_s=way.upright_s + climb_s)
 
-    def _widened(self, way: Way | None) -> Way | None:
+    def _widened(self, way: field.Way | None) -> field.Way | None:
         """That way as a vehicle is led that does not fly quite where it is told, to its spot."""
         problem, brief, place_enu_m = (
             self.problem,
@@ -212,7 +211,7 @@ class Flights(AgentPart):
             place_enu_m,
         )
 
-    def _row(self, problem: FieldProblem) -> int:
+    def _row(self, problem: field.FieldProblem) -> int:
         return problem.uav_ids.index(UavId(self._uav))
 
     # -- orders ---------------------------------------------------------------------------
@@ -225,7 +224,13 @@ class Flights(AgentPart):
         self._order(GoTo(self.leg, place_enu_m, task.service_s, idled, task.task, attempt))
 
     def along(
-        self, way: Way, task: TaskEntry | None, attempt: int, stay_s: float, *, idled: bool = False
+        self,
+        way: field.Way,
+        task: TaskEntry | None,
+        attempt: int,
+        stay_s: float,
+        *,
+        idled: bool = False,
     ) -> None:
         """Fly that way, to a task or above a base."""
         self.leg += 1

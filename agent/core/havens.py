@@ -14,7 +14,7 @@ from agent.core.decision import RefusedTasks
 from agent.core.energy import TOLERANCE_S, SortieClock
 from agent.core.flights import Flights, HomeFlight
 from agent.core.states import AgentState
-from swarm.allocation.field.ways import Way
+from swarm.allocation import field
 from swarm.protocol import bases
 from swarm.protocol.field_messages import BaseSpec
 
@@ -24,7 +24,7 @@ class Haven:
     """A base that the UAV can fly to."""
 
     base: BaseSpec
-    way: Way
+    way: field.Way
     arrives_s: float
     """Mission time at which it is above it."""
     ready_s: float
@@ -54,7 +54,7 @@ class Havens(AgentPart):
         self._sortie = sortie
         self._visits = visits
         self._refused = refused
-        self._ways: dict[str, Way | None] = {}
+        self._ways: dict[str, field.Way | None] = {}
         """By base; asked for again and again by who hovers."""
         self._ways_from: object = None
         """Place and problem of these ways."""
@@ -127,7 +127,7 @@ class Havens(AgentPart):
         free = base.slots - blocked
         return bases.lands_s(base.id, free, base.swap_s, claims, arrives_s, mission_s)
 
-    def _way_to(self, name: str) -> Way | None:
+    def _way_to(self, name: str) -> field.Way | None:
         here = self._mission_view.place_enu_m, id(self._flights.problem)
         if self._ways_from != here:
             self._ways, self._ways_from = {}, here

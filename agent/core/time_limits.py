@@ -13,7 +13,7 @@ from agent.core.context import AgentContext, AgentPart
 from agent.core.energy import TOLERANCE_S, SortieClock
 from agent.core.flights import Flights, HomeFlight
 from agent.core.states import PAUSED_BY_OPERATOR, AgentState
-from swarm.allocation.field.ways import Way
+from swarm.allocation import field
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import TaskEntry
 from swarm.protocol.uav_messages import Claim
@@ -65,7 +65,7 @@ class TimeLimits(AgentPart):
         return max(arrives_s, task.opens_s) + line_s + task.service_s
 
     def upset(
-        self, task: TaskEntry, claim: Claim, way: Way | None, mission_s: float | None
+        self, task: TaskEntry, claim: Claim, way: field.Way | None, mission_s: float | None
     ) -> str | None:
         """Why what is claimed is not to be done as it was claimed, now that zones have changed.
 

@@ -8,15 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coordinator.planner.field_online import FieldCourse, FieldStanding, going_on, planned_anew
-from coordinator.planner.field_online import worth_to_go as field_worth
 from coordinator.planner.options import ShouldStop, after_evaluations, first_of, never, part_of
 from coordinator.planner.plan import guided_plan
 from coordinator.planner.sequence_search import search_sequence
-from swarm.allocation.field.rules import item_lists
 from swarm.allocation.lower_level import TeamState, run
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
@@ -36,6 +34,9 @@ from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import PlanEpoch
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.uav_messages import AttemptResult, ClaimPhase, Outcome
+
+if TYPE_CHECKING:
+    from coordinator.planner.field_online import FieldCourse, FieldStanding
 
 Lists = Mapping[str, tuple[str, ...]]
 """Task ids by UAV id, in order of execution."""
@@ -100,8 +101,13 @@ class Situation:
         ]
         # Who is late may be there any moment, and who waits may decide at once.
         np.maximum(state.free_s, mission_s, out=state.free_s)
-        in_field = board.field_problem
         taking_part = [uav for uav, part in zip(problem.uav_ids, state.active, strict=True) if part]
+        standing = None
+        if (in_field := board.field_problem) is not None:
+            # Plain missions never load it.
+            from coordinator.planner.field_online import FieldStanding as Standing
+
+            standing = Standing.of(in_field, board, claims, under_way, taking_part, mission_s)
         return cls(
             problem,
             state,
@@ -111,9 +117,7 @@ class Situation:
             frozenset(task for task, what in states.items() if what is TaskState.WITHDRAWN),
             sum(outcome.result is AttemptResult.FAILED for outcome in replica.outcomes.values()),
             zones_in_force(replica),
-            None
-            if in_field is None
-            else FieldStanding.of(in_field, board, claims, under_way, taking_part, mission_s),
+            standing,
             tuple(sorted(board.rates.items())),
         )
 
@@ -180,6 +184,8 @@ def predicted(situation: Situation, course: EpochPolicy, stop: ShouldStop = neve
     """
     problem = situation.problem
     if situation.field is not None:
+        from coordinator.planner.field_online import going_on
+
         on = going_on(situation.field, course.rule, course.sequence, course.routes)
         return _in_field(situation, on)
     rule = rule_of(course.rule, course.routes)
@@ -266,6 +272,9 @@ def _replanned_in_field(
     sequence = (*sequence, *sorted(situation.taking_part.difference(sequence)))
     if standing is None or method != GuidedRule.name:
         return ReplanResult(method, sequence, expected, expected)
+    from coordinator.planner.field_online import planned_anew
+    from swarm.allocation.field.rules import item_lists
+
     begin = item_lists(standing.problem, expected.lists)
     found = planned_anew(standing, begin, seed=seed, stop=stop, threads=threads)
     return ReplanResult(method, sequence, _in_field(situation, found), expected)
@@ -326,6 +335,8 @@ def worth_to_go(situation: Situation, lists: Lists) -> tuple[int, float]:
     if situation.is_settled:
         return 0, 0.0
     if situation.field is not None:
+        from coordinator.planner.field_online import worth_to_go as field_worth
+
         return field_worth(situation.field, lists)
     next_s = np.where(state.active, state.free_s, np.inf)
     team = team_arrays(situation.problem, state, state.active, situation.now_s)

@@ -11,10 +11,10 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from enum import StrEnum
 from itertools import islice
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from swarm.allocation import field
 from swarm.allocation.lower_level import Rule, TeamState
 from swarm.allocation.problem import BoolArray, Problem
 from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
@@ -32,9 +32,6 @@ from swarm.protocol.messages import MissionConfig, PostedTask, TaskEntry, UavSpe
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase
-
-if TYPE_CHECKING:
-    from swarm.allocation.field import FieldProblem
 
 _UNLIMITED = FIELD_DEFAULTS[TaskEntry]
 """Of a task of which a plain problem tells all."""
@@ -116,9 +113,9 @@ class TaskBoard:
         """Of these, tasks that a plain problem does not tell all of."""
         self._mission: Mission | None = None
         self._mission_version = -1
-        self._field_briefed: FieldProblem | None = None
+        self._field_briefed: field.FieldProblem | None = None
         """As the brief has its UAVs."""
-        self._field_problem: FieldProblem | None = None
+        self._field_problem: field.FieldProblem | None = None
         self._field_version = -1
         self._field_rates: dict[str, FlightRates] = {}
         self._states: dict[str, TaskState] = {}
@@ -176,7 +173,7 @@ class TaskBoard:
         return self._mission
 
     @property
-    def field_problem(self) -> FieldProblem | None:
+    def field_problem(self) -> field.FieldProblem | None:
         """Of `mission`, each UAV as it flies, in its layer; None where `problem` tells all."""
         briefed, rates = self._field_briefed, self.rates
         if self._field_version != self.replica.board_version:
@@ -194,7 +191,7 @@ class TaskBoard:
             self._rates, self._rates_version = flight_rates(self.replica), version
         return self._rates
 
-    def _field_problem_now(self) -> FieldProblem | None:
+    def _field_problem_now(self) -> field.FieldProblem | None:
         fleet, tasks = self._fleet_now(), self._tasks_now()
         brief = self.replica.brief
         if fleet is None or brief is None:
@@ -202,11 +199,9 @@ class TaskBoard:
         limited = not self._limited.isdisjoint(task.id for task in tasks)
         if not (limited or zones_in_force(self.replica) or is_of_field(fleet)):
             return None
-        from swarm.allocation.field.recent import problem_of  # plain missions never load it
-
         mission = self.mission
         layers_m = [uav.layer_m for uav in brief.uavs]
-        return None if mission is None else problem_of(mission, layers_m)
+        return None if mission is None else field.problem_of(mission, layers_m)
 
     def _problem_now(self) -> Problem | None:
         """Of `mission_of`; what nothing new was said of is not made anew."""

@@ -17,15 +17,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Final
+from typing import Final
 
+from swarm.allocation import field
 from swarm.model import Mission, Uav
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import Calibration
-
-if TYPE_CHECKING:
-    from swarm.allocation.field import FieldProblem
 
 TIME_FRAC_RANGE: Final = (0.5, 3.0)
 """What is believed of times of legs."""
@@ -100,7 +98,9 @@ def fleet_as_flown(fleet: Mission, rates: Mapping[str, FlightRates]) -> Mission:
     return replace(fleet, uavs=uavs)
 
 
-def field_as_flown(problem: FieldProblem, rates: Mapping[str, FlightRates]) -> FieldProblem:
+def field_as_flown(
+    problem: field.FieldProblem, rates: Mapping[str, FlightRates]
+) -> field.FieldProblem:
     """``problem`` with the times and batteries that UAVs really have; the same one likewise."""
     known = [rates.get(uav, AS_BRIEFED) for uav in problem.uav_ids]
     return problem.calibrated(

@@ -11,9 +11,7 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from swarm.allocation.field import FieldProblem, FieldState
-from swarm.allocation.field.ways import task_nodes
-from swarm.kernels.field_alone import earliest_alone
+from swarm.allocation import field
 from swarm.protocol.board import TaskBoard, TaskState, holders, ranks
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
 
@@ -22,14 +20,14 @@ _ON_THE_GROUND = (BaseStage.LANDED, BaseStage.PARKED)
 
 
 def field_state(
-    problem: FieldProblem,
+    problem: field.FieldProblem,
     board: TaskBoard,
     claims: Mapping[str, Claim],
     *,
     present: Collection[str],
     sequence: Sequence[str] = (),
     blocking: Mapping[str, str] | None = None,
-) -> FieldState:
+) -> field.FieldState:
     """Where everybody stands once they have ended what ``claims`` say.
 
     Args:
@@ -73,12 +71,12 @@ def field_state(
     return state
 
 
-def after_attempts(problem: FieldProblem, board: TaskBoard) -> FieldState:
+def after_attempts(problem: field.FieldProblem, board: TaskBoard) -> field.FieldState:
     """Where every UAV stands after the attempts it has ended, as if nobody claimed anything.
 
     ``open`` is as on the board; batteries are as at mission time 0.
     """
-    state = FieldState.at_start(problem)
+    state = field.FieldState.at_start(problem)
     states = board.states
     state.open[:] = [states.get(task) is TaskState.OPEN for task in problem.task_ids]
     rows: dict[str, int] = {uav: index for index, uav in enumerate(problem.uav_ids)}
@@ -93,7 +91,7 @@ def after_attempts(problem: FieldProblem, board: TaskBoard) -> FieldState:
     return state
 
 
-def last_node(problem: FieldProblem, board: TaskBoard, uav: str) -> int:
+def last_node(problem: field.FieldProblem, board: TaskBoard, uav: str) -> int:
     """Node where ``uav`` was after its last attempt: the end of that task, else its start."""
     columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
     ended = max(
@@ -106,11 +104,11 @@ def last_node(problem: FieldProblem, board: TaskBoard, uav: str) -> int:
     )
     if ended is None:
         return problem.uav_ids.index(uav)
-    return task_nodes(problem, ended[1], backwards=ended[2])[1]
+    return field.task_nodes(problem, ended[1], backwards=ended[2])[1]
 
 
 def doable_in_field(
-    problem: FieldProblem, board: TaskBoard, present: Collection[str], mission_s: float
+    problem: field.FieldProblem, board: TaskBoard, present: Collection[str], mission_s: float
 ) -> list[str]:
     """Open tasks that somebody claims or could still do as its only one, in board order.
 
@@ -139,6 +137,8 @@ def doable_in_field(
     # Who has told of its outcome has gone on already: the word of where to is on its way.
     chosen = [uav in claims and (uav, claims[uav].task) in outcomes for uav in problem.uav_ids]
     np.maximum(state.free_s, mission_s, out=state.free_s, where=~np.array(chosen, dtype=np.bool_))
+    from swarm.kernels.field_alone import earliest_alone  # plain missions never load it
+
     can: npt.NDArray[np.bool_] = np.any(np.isfinite(earliest_alone(problem.kernel, state)), axis=0)
     states = board.states
     return [
@@ -148,7 +148,9 @@ def doable_in_field(
     ]
 
 
-def _take_battery(problem: FieldProblem, state: FieldState, row: int, claim: Claim) -> None:
+def _take_battery(
+    problem: field.FieldProblem, state: field.FieldState, row: int, claim: Claim
+) -> None:
     """What a UAV says of the end of its sortie; of its first one it need not say anything."""
     if claim.sortie_end_s is not None:
         state.sortie_end_s[row] = claim.sortie_end_s
@@ -159,7 +161,7 @@ def _take_battery(problem: FieldProblem, state: FieldState, row: int, claim: Cla
         state.sortie_end_s[row] = math.inf if np.isinf(problem.full_s[row]) else -math.inf
 
 
-def _stand(problem: FieldProblem, state: FieldState, row: int, claim: Claim) -> None:
+def _stand(problem: field.FieldProblem, state: field.FieldState, row: int, claim: Claim) -> None:
     """Let a UAV stand ready at the base of its claim, at its completion."""
     base = _base_of(problem, claim)
     if base is None:
@@ -170,12 +172,14 @@ def _stand(problem: FieldProblem, state: FieldState, row: int, claim: Claim) -> 
     state.first_s[row] = problem.leg_s[problem.kind[row], problem.n_uav + base]
 
 
-def _base_of(problem: FieldProblem, claim: Claim) -> int | None:
+def _base_of(problem: field.FieldProblem, claim: Claim) -> int | None:
     """Index of the base that a claim names; None if there is none, or it is unknown."""
     return next((i for i, base in enumerate(problem.base_ids) if base == claim.base), None)
 
 
-def _end_task(problem: FieldProblem, state: FieldState, row: int, task: int, claim: Claim) -> None:
+def _end_task(
+    problem: field.FieldProblem, state: field.FieldState, row: int, task: int, claim: Claim
+) -> None:
     """Let a UAV end the task it claims: then it is free, there, and nobody else takes it."""
     state.landed_at[row] = -1
     state.open[task] = False
@@ -188,8 +192,8 @@ def _end_task(problem: FieldProblem, state: FieldState, row: int, task: int, cla
 
 
 def _end_at(
-    problem: FieldProblem,
-    state: FieldState,
+    problem: field.FieldProblem,
+    state: field.FieldState,
     row: int,
     task: int,
     completed_s: float,
@@ -197,6 +201,6 @@ def _end_at(
     backwards: bool,
 ) -> None:
     state.free_s[row] = completed_s
-    leaves = task_nodes(problem, task, backwards=backwards)[1]
+    leaves = field.task_nodes(problem, task, backwards=backwards)[1]
     state.first_s[row] = problem.leg_s[problem.kind[row], leaves]
     state.survived[row] *= problem.survival[row, task]

@@ -1,6 +1,46 @@
-"""Allocation with the field's constraints: energy, windows, due times, lines, zones, wind."""
+"""Allocation with the field's constraints: energy, windows, due times, lines, zones, wind.
 
-from swarm.allocation.field.problem import FieldProblem
-from swarm.allocation.field.state import FieldState
+What is named here is imported when it is first used: who meets a mission of the field only perhaps
+says ``field.FieldProblem``, and loads nothing of it for plain missions.
+"""
 
-__all__ = ["FieldProblem", "FieldState"]
+from __future__ import annotations
+
+TYPE_CHECKING = False  # as typing has it
+if TYPE_CHECKING:
+    from swarm.allocation.field.problem import FieldProblem
+    from swarm.allocation.field.recent import problem_of
+    from swarm.allocation.field.state import FieldState
+    from swarm.allocation.field.ways import Way, base_node, task_nodes, way_home, way_to
+
+__all__ = [
+    "FieldProblem",
+    "FieldState",
+    "Way",
+    "base_node",
+    "problem_of",
+    "task_nodes",
+    "way_home",
+    "way_to",
+]
+
+_WHERE = {
+    "swarm.allocation.field.problem": ("FieldProblem",),
+    "swarm.allocation.field.recent": ("problem_of",),
+    "swarm.allocation.field.state": ("FieldState",),
+    "swarm.allocation.field.ways": ("Way", "base_node", "task_nodes", "way_home", "way_to"),
+}
+
+
+if not TYPE_CHECKING:  # a type checker must know no other name
+
+    def __getattr__(name: str) -> object:
+        """Import what is asked for, once."""
+        from importlib import import_module
+
+        for module, names in _WHERE.items():
+            if name in names:
+                found: object = getattr(import_module(module), name)
+                globals()[name] = found
+                return found
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

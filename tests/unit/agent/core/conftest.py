@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from agent.core import field_tasking
+from agent.core import field_decision
 from tests.support.field_agent import Script
 
 
@@ -12,6 +12,6 @@ from tests.support.field_agent import Script
 def script(monkeypatch: pytest.MonkeyPatch) -> Script:
     """What the agents of this test decide next, in order."""
     told = Script()
-    monkeypatch.setattr(field_tasking, "decide_in_field", told.decide)
-    monkeypatch.setattr(field_tasking, "divert_in_field", lambda *_: None)
+    monkeypatch.setattr(field_decision, "decide_in_field", told.decide)
+    monkeypatch.setattr(field_decision, "divert_in_field", lambda *_: None)
     return told
