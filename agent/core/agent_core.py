@@ -11,7 +11,7 @@ others in agent.core.state_sync. Leaves out: flying (agent.vehicle) and transpor
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from agent.core.announcer import Announcer
@@ -63,12 +63,19 @@ from swarm.protocol.timing import StallDetector, Timing, earliest
 from swarm.protocol.uav_messages import MOST_REASONS, Claim, ClaimPhase, Status, StatusPhase
 
 if TYPE_CHECKING:
-    from agent.core.field_decision import FieldRuleMaker
+    from agent.core.field_decision import FieldRule, FieldRuleMaker
 
 IMPOSSIBLE = "impossible transition"
 """Begins the log line about a trigger that the agent's state has no transition for: a bug."""
 _MINDS_BUS_LOSS = TAKES_TASKS | PAUSED_BY_OPERATOR | {AgentState.PREPARING}
 """There is a flight to break off for want of a bus."""
+
+
+def usual_field_rule(name: str, routes: Mapping[str, Sequence[str]]) -> FieldRule | None:
+    """As `agent.core.field_decision.field_rule_of`, which plain missions never load."""
+    from agent.core.field_decision import field_rule_of
+
+    return field_rule_of(name, routes)
 
 
 class AgentCore(AgentPart):
@@ -91,8 +98,7 @@ class AgentCore(AgentPart):
             to fly on.
         make_rule: what it decides by in an epoch of that rule and those routes. Every UAV of a
             fleet needs the same.
-        make_field_rule: the same where the field's constraints count; None: the rule of the
-            epoch.
+        make_field_rule: the same where the field's constraints count.
     """
 
     def __init__(
@@ -109,7 +115,7 @@ class AgentCore(AgentPart):
         make_rule: RuleMaker = rule_of,
         path_clearance_m: float = 0.0,
         verticals: Verticals | None = None,
-        make_field_rule: FieldRuleMaker | None = None,
+        make_field_rule: FieldRuleMaker = usual_field_rule,
     ) -> None:
         self.uav = uav
         self.replica = Replica()

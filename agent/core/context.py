@@ -32,8 +32,8 @@ class AgentContext:
     peers: Peers
     announcer: Announcer
     machine: AgentStateMachine
-    make_field_rule: FieldRuleMaker | None
-    """What it decides by in an epoch where the field's constraints count; None: as usual."""
+    make_field_rule: FieldRuleMaker
+    """What it decides by in an epoch where the field's constraints count."""
     path_clearance_m: float = 0.0
     """How much farther than their margin ways lead past zones [m]."""
     verticals: Verticals | None = None

@@ -71,6 +71,18 @@ class FieldRule:
     make_lists: ListMaker | None = None
     """Whose lists are followed instead of any rule; a UAV with none stays where it is."""
 
+    def decide(
+        self, problem: FieldProblem, board: TaskBoard, turn: DecisionTurn
+    ) -> FieldTurnDecision | None:
+        """`decide_in_field` by this rule."""
+        return decide_in_field(problem, board, self, turn)
+
+    def divert(
+        self, problem: FieldProblem, board: TaskBoard, turn: DecisionTurn
+    ) -> FieldTurnDecision | None:
+        """`divert_in_field` by this rule."""
+        return divert_in_field(problem, board, self, turn)
+
 
 FieldRuleMaker = Callable[[str, Mapping[str, Sequence[str]]], FieldRule | None]
 """The decision rule of an epoch by the name of its rule and its routes; see `field_rule_of`."""

@@ -186,12 +186,7 @@ class FieldTasking(Tasking):
         if problem is None or epoch is None or turn is None:
             return
         rule = self._field_rule(epoch)
-        if rule is None:
-            self._stay_idle(now_s)
-            return
-        from agent.core.field_decision import decide_in_field  # plain missions never load it
-
-        decision = decide_in_field(problem, self._mission_view.board, rule, turn)
+        decision = None if rule is None else rule.decide(problem, self._mission_view.board, turn)
         if decision is None or decision.base in self._refused_bases.left_alone(now_s):
             self._stay_idle(now_s)
         elif decision.task is not None:
@@ -214,9 +209,7 @@ class FieldTasking(Tasking):
         rule = self._field_rule(epoch)
         if rule is None or turn.awaited:
             return
-        from agent.core.field_decision import divert_in_field
-
-        decision = divert_in_field(problem, self._mission_view.board, rule, turn)
+        decision = rule.divert(problem, self._mission_view.board, turn)
         if decision is not None and decision.task is not None:
             self._become_free(turn.now_s)
             self._take_task(epoch, turn, decision, now_s, left=claim.task)
@@ -235,9 +228,7 @@ class FieldTasking(Tasking):
 
     def _field_rule(self, epoch: PlanEpoch) -> FieldRule | None:
         """The rule in force; None, and told once, if it is not known."""
-        from agent.core.field_decision import field_rule_of
-
-        rule = (self._make_field_rule or field_rule_of)(epoch.rule, epoch.routes)
+        rule = self._make_field_rule(epoch.rule, epoch.routes)
         if rule is None and self._rule_basis != epoch.rule:
             self._rule_basis = epoch.rule
             self._announcer.explain(f"cannot decide by rule {epoch.rule}")
