@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coordinator.mission_view.results import MissionResult
 from swarm.model import Mission, Task, TaskId
 from swarm.model.mission import PLAIN_CONSTRAINTS
+
+if TYPE_CHECKING:
+    from coordinator.mission_view.results import MissionResult
 
 
 def missed_tasks(mission: Mission, result: MissionResult) -> tuple[TaskId, ...]:
