@@ -88,7 +88,7 @@ def test_every_task_is_done_round_zones_with_batteries_changed_on_the_way(
 def test_a_zone_drawn_in_flight_is_known_to_all_and_shown(tmp_path: Path) -> None:
     mission, folder = replace(pasture(), zones=()), tmp_path / "run"
     folder.mkdir()
-    words = [written(mission, tmp_path), "--speedup", f"{pace(4.0):g}"]
+    words = [written(mission, tmp_path), "--speedup", f"{pace(8.0):g}"]
     with SwarmRun(words, folder) as run:
         run.wait_for_line("epoch 1")
         corners = [f"{east_m:g},{north_m:g}" for east_m, north_m in POND]
