@@ -140,7 +140,7 @@ def test_batteries_that_overlap_cut_no_power() -> None:
 
 
 def test_nobody_changes_a_battery_away_from_a_base_or_before_a_flight() -> None:
-    away = ground_station(**SERVED)
+    away = ground_station(**{**SERVED, "start_enu_m": (0.0, -20.0, 0.0)})
     away.take_off(10.0)
     landed(away)
     away.wait(2.0 * SWAP_S)
