@@ -132,6 +132,8 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
     else:
         planned_objective = None
     states = FleetStates(mission_state, now_s)
+    standing = [states.of(uav.id) for uav in mission.uavs]
+    taken = {state.task: state.id for state in reversed(standing) if state.task is not None}
     return Scene(
         mission=mission,
         phase=mission_state.phase,
@@ -142,14 +144,18 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
         sequence=tuple(sequence),
         uavs=tuple(
             UavView(
-                **_fields(states.of(uav.id)),
+                **_fields(state),
                 short=short,
                 number=numbers[uav.id],
                 flown=result.executed_routes[uav.id],
-                planned=tuple(TaskId(t) for t in lists.get(uav.id, ()) if t not in over),
+                planned=tuple(
+                    TaskId(task)
+                    for task in lists.get(uav.id, ())
+                    if task not in over and taken.get(TaskId(task), uav.id) == uav.id
+                ),
                 start_enu_m=uav.position_enu_m,
             )
-            for uav, short in zip(mission.uavs, shorts, strict=True)
+            for uav, state, short in zip(mission.uavs, standing, shorts, strict=True)
         ),
         tasks=_task_views(mission_state, by, numbers),
         objective=result.executed_objective,

@@ -148,7 +148,7 @@ class UavView(UavState):
     flown: tuple[TaskId, ...]
     """Tasks it has done, in order."""
     planned: tuple[TaskId, ...]
-    """Tasks its list has for it that are not over yet."""
+    """Tasks its list has for it that are not over yet, nor taken by others."""
     start_enu_m: Point
 
     @property

@@ -114,6 +114,8 @@ def status_table(scene: Scene, width: int, signs: Signs) -> RenderableType:
             facts.add_row("measured", _line(f"{uav.id} {rates_in_words(uav.rates)}", signs))
     parts: list[RenderableType] = [mission_title(scene, width, 1.0, signs), facts, ""]
     parts.append(_fleet(scene, signs))
+    if any(uav.note for uav in scene.uavs):
+        parts += ["", _notes(scene, signs)]
     if scene.dropped_by_reason:
         parts += ["", _dropped(scene, signs)]
     return Group(*parts)
@@ -132,7 +134,6 @@ def _fleet(scene: Scene, signs: Signs) -> Table:
         table.add_column("swaps", justify="right")
     table.add_column("heard", justify="right", no_wrap=True)
     table.add_column("dropped", justify="right")
-    table.add_column("note")
     for uav in scene.uavs:
         gone = uav.now_does in (LOST, ABSENT)
         colour = BAD if gone else f"bold {uav_colour(uav.number)}"
@@ -152,8 +153,19 @@ def _fleet(scene: Scene, signs: Signs) -> Table:
             *sorties,
             signs.nothing if uav.link_age_s is None else f"{uav.link_age_s:.1f} s",
             str(sum(uav.dropped.values())),
-            _line(uav.note, signs),
         )
+    return table
+
+
+def _notes(scene: Scene, signs: Signs) -> Table:
+    """What UAVs say of themselves, on lines of their own: a column for it would be narrow."""
+    table = Table.grid(padding=(0, 2, 0, 0))
+    table.add_column(no_wrap=True)
+    table.add_column()
+    for uav in scene.uavs:
+        if uav.note:
+            name = Text(f"  {uav.id}", f"bold {uav_colour(uav.number)}")
+            table.add_row(name, _line(uav.note, signs))
     return table
 
 

@@ -13,7 +13,7 @@ from coordinator.mission_view.scene import scene_of
 from coordinator.terminal.status_table import status_as_json, status_table
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.events import PeerGone, PeerSeen, Tick
-from swarm.protocol.messages import CommandKind, OperatorCommand
+from swarm.protocol.messages import CommandKind, MissionPhase, OperatorCommand, PlanEpoch
 from swarm.protocol.uav_messages import Claim, ClaimPhase, Status, StatusPhase
 from tests.support.builders import TIMING, brief_of
 from tests.support.observed_mission import Teller, random_mission, shipped
@@ -119,6 +119,29 @@ def test_long_ids_and_notes_still_fit() -> None:
     assert "\x1b" not in text
     assert "-12346, 98765, 120" in text
     assert "does not come" in " ".join(text.split())
+
+
+def test_a_note_has_a_line_of_its_own_beside_whose_it_is() -> None:
+    teller = flying()
+    note = "it flies at 10.5 m/s, asked for 12: its own limits forbid more"
+    teller.status("uav1", StatusPhase.FLYING, 2.7, note=note)
+
+    lines = [line.strip() for line in rendered(teller.mission_state, 3.0).splitlines()]
+
+    assert f"uav1  {note}" in lines
+
+
+def test_what_another_has_taken_is_on_nobodys_list() -> None:
+    teller = Teller(shipped("table-1"))
+    teller.begin()
+    lists = {"uav1": ("t1", "t2"), "uav2": ("t3", "t4"), "uav3": ()}
+    epoch = PlanEpoch(2, MissionPhase.RUNNING, "guided", tuple(lists), 0.5, "as told", lists)
+    teller.say(COORDINATOR, epoch, 0.5)
+
+    teller.claim("uav1", "t3", 4.5)
+
+    planned = {uav.id: uav.planned for uav in scene_of(teller.mission_state, 1.0).uavs}
+    assert planned == {"uav1": ("t1", "t2"), "uav2": ("t4",), "uav3": ()}
 
 
 def commanded() -> Teller:
