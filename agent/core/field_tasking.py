@@ -351,7 +351,7 @@ class FieldTasking(Tasking):
         if claim is None:
             return
         begins_s = max(mission_s, task.opens_s)
-        self._mission_view.arrive(ends_of(task, backwards=bool(claim.reversed))[0])
+        self._flights.reached(ends_of(task, backwards=bool(claim.reversed))[0], task)
         self._attempt.too_late_at_s = None
         if begins_s > self._limits.latest_begin_s(task, claim) + TOLERANCE_S:
             self._release("came too late", now_s)
@@ -379,7 +379,7 @@ class FieldTasking(Tasking):
         claim = self.claim
         if claim is None or not task.path_enu_m or self._attempt.served_at_s is not None:
             return
-        self._mission_view.arrive(ends_of(task, backwards=bool(claim.reversed))[1])
+        self._flights.reached(ends_of(task, backwards=bool(claim.reversed))[1], task)
         self._attempt.served_at_s = now_s + task.service_s
 
     def _give_up_what_is_late(self, now_s: float) -> None:

@@ -107,6 +107,10 @@ class Flights(AgentPart):
             return 0.0
         return float(problem.network.climb_s[self._row(problem)])
 
+    def reached(self, place_enu_m: Point, task: TaskEntry) -> None:
+        """The vehicle is at one end of a task, in its layer or at the height that it asks for."""
+        self._mission_view.arrive(place_enu_m, own_height=task.height_m is not None)
+
     def zones_changed(self) -> bool:
         """Whether other zones are in force than when this was last asked."""
         before, self._zones = self._zones, zones_in_force(self._replica)
@@ -221,6 +225,7 @@ class Flights(AgentPart):
         self.leg += 1
         self.meter.depart(self.leg, self._straight_s(task.position_enu_m))
         place_enu_m = self._mission_view.in_layer(task.position_enu_m)
+        self._mission_view.set_off()
         self._order(GoTo(self.leg, place_enu_m, task.service_s, idled, task.task, attempt))
 
     def along(
@@ -235,6 +240,7 @@ class Flights(AgentPart):
         """Fly that way, to a task or above a base."""
         self.leg += 1
         flown_s = way.duration_s - way.upright_s
+        self._mission_view.set_off()
         self.meter.depart(self.leg, flown_s / self._time_frac())
         name = None if task is None else task.task
         via_enu_m = way.via_enu_m

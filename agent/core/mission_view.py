@@ -51,6 +51,8 @@ class MissionView:
         self._place_enu_m: Point | None = None
         self._stands_enu_m: Point | None = None
         """Where it stands on the ground, between two flights."""
+        self._out_of_layer = False
+        """Whether it hovers where a task asks for a height of its own."""
         self._uav = uav
         self._replica = replica
         self.clock = MissionClock()
@@ -139,11 +141,21 @@ class MissionView:
         """The vehicle has told where it is."""
         east_m, north_m, up_m = telemetry.position_enu_m
         self.telemetry = telemetry
-        self._place_enu_m = east_m, north_m, up_m - self._layer_m
+        layer_m = 0.0 if self._out_of_layer else self._layer_m
+        self._place_enu_m = east_m, north_m, up_m - layer_m
 
-    def arrive(self, place_enu_m: Point) -> None:
-        """The vehicle has reached that place; where exactly it is follows with its next word."""
-        self._place_enu_m = place_enu_m
+    def arrive(self, place_enu_m: Point, *, own_height: bool = False) -> None:
+        """The vehicle has reached that place; where exactly it is follows with its next word.
+
+        Args:
+            place_enu_m: where that is.
+            own_height: the height is that of the flight there, with no layer to come on top.
+        """
+        self._place_enu_m, self._out_of_layer = place_enu_m, own_height
+
+    def set_off(self) -> None:
+        """The vehicle flies on, to wherever."""
+        self._out_of_layer = False
 
     def stand(self, place_enu_m: Point) -> None:
         """The vehicle has landed there, where it is whatever height it tells."""

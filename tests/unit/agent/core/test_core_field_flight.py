@@ -145,6 +145,33 @@ def test_a_task_with_its_own_height_is_flown_there(script: Script) -> None:
     assert agent.flight.position_enu_m == (100.0, 0.0, 60.0)
 
 
+def test_who_hovers_at_a_tasks_own_height_reckons_from_there(script: Script) -> None:
+    agent = flying(script, height_m=60.0)
+    agent.run_until(99.0)
+    agent.arrive(100.0)
+    agent.be_at((100.0, 0.0, 60.0), None, 101.0)
+
+    agent.run_until(106.0)
+
+    assert script.turns[-1].now_s == 105.0
+    assert script.turns[-1].place_enu_m == (100.0, 0.0, 60.0)
+
+
+def test_who_flies_on_from_there_is_in_its_layer_again(script: Script) -> None:
+    agent = flying(script, height_m=60.0)
+    agent.post(entry("t1", 200.0))
+    agent.run_until(99.0)
+    script.items = ["t1"]
+    agent.arrive(100.0)
+    agent.run_until(105.0)
+    assert agent.task == "t1"
+    agent.be_at((110.0, 0.0, 20.0), None, 106.0)
+
+    agent.post(entry("t1", 200.0, withdrawn=True))
+
+    assert script.turns[-1].place_enu_m == (110.0, 0.0, 10.0)
+
+
 # -- zones drawn in flight ----------------------------------------------------------------
 
 
