@@ -287,7 +287,7 @@ def write_report(report: MissionReport, path: Path) -> None:
 
 def _no_plan(mission: Mission) -> dict[str, object]:
     """The keys of a plan where there is none."""
-    return {
+    planned: dict[str, object] = {
         "scenario": mission.name,
         "method": None,
         "objective": None,
@@ -299,7 +299,13 @@ def _no_plan(mission: Mission) -> dict[str, object]:
         "evaluations": 0,
         "elapsed_s": 0.0,
         "seed": None,
+        "bound": None,
+        "basis": None,
     }
+    if mission.schema >= 2:  # nobody has decided what to leave out
+        planned |= {"schedule": {}, "left_out": {}}
+        planned |= {"required_left_out": None, "fewest_left_out": None}
+    return planned
 
 
 def _finite(value: Any) -> Any:

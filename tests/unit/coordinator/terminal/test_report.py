@@ -13,10 +13,12 @@ from rich.cells import cell_len
 from rich.console import Console
 
 from coordinator.mission_view.mission_state import MissionState
+from coordinator.planner.plan import make_plan
 from coordinator.planner.plan_report import plan_as_json
 from coordinator.terminal.report import MissionReport, check_report_path, write_report
 from swarm.model import Plan, UavId
 from swarm.protocol.uav_messages import AttemptResult
+from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import InputError
 from tests.support.observed_mission import Teller, random_mission, shipped, watch
 
@@ -153,6 +155,19 @@ def test_mission_that_never_started_has_a_report_too() -> None:
     assert found["objective"] is None
     assert "never started" in report.as_markdown()
     assert not report.result.is_complete
+
+
+@pytest.mark.parametrize("scenario", ["table-1", "reservoir-inspection"])
+def test_without_a_plan_json_has_the_keys_of_one(scenario: str) -> None:
+    mission = shipped(scenario)
+    report = report_of(Teller(mission).mission_state)
+    assert report.plan is None
+
+    found = report.as_json()
+
+    plan = make_plan(mission, "greedy", clock=SystemClock(), seed=0)
+    assert plan_as_json(plan).keys() <= found.keys()
+    assert ("schedule" in found) == (mission.schema == 2)
 
 
 def test_numbers_that_are_not_finite_become_null() -> None:
