@@ -20,6 +20,7 @@ from coordinator.mission_view.results import MissionResult
 from coordinator.mission_view.story import EventKind, MissionEvent
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
+from swarm.model.plan import Schedule
 from swarm.protocol.board import TaskBoard, TaskState, holders
 from swarm.protocol.calibration import flight_rates
 from swarm.protocol.events import (
@@ -233,6 +234,10 @@ class MissionState:
         claims = {u: c for u, c in self.replica.claims.items() if u in self.present}
         states = self.board.states
         return {t: u for t, u in holders(claims).items() if states.get(t) is TaskState.OPEN}
+
+    def executed_schedule(self) -> Schedule:
+        """Every UAV's list as it has flown it, as far as it is known."""
+        return self.flights.executed_schedule(self.mission, self.board.field_problem)
 
     def result(self) -> MissionResult:
         """What has been executed so far."""

@@ -1,8 +1,8 @@
 """What an observer knows of where UAVs went: lists by their claims and outcomes, places by status.
 
 What nobody told is told of nobody: a visit is known by its outcome, the way home by the word that
-a UAV takes no further part, and distances by straight lines between the places in its status, so
-what UAVs do beside these lines in between is not seen.
+a UAV takes no further part, ways as everybody finds them (`FlownWays`), and distances by straight
+lines between the places in its status, so what UAVs do beside these lines in between is not seen.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from swarm.model import BaseId, Mission, Task, UavId
+from coordinator.mission_view.flown_ways import FlownWays, MapPoint
+from swarm.allocation import field as constrained
+from swarm.model import BaseId, Mission, Task, Uav, UavId
 from swarm.model.plan import START, ScheduleEntry, at_base
 from swarm.protocol.fields import Point
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, Outcome, Status, StatusPhase
@@ -26,9 +28,13 @@ _NEAR_GROUND_M = 20.0
 _LIFTED_M = 1.0
 """Above the ground, from where on a vehicle is in the air; heights drift by less."""
 
+_FRESH_S = 2.0
+"""From the time of a decision: a place told then is where it was made."""
+_STAYED_M = 5.0
+"""From where the last visit ended: who is that near has waited there."""
+
 _Fix = tuple[float, Point]
 """Mission time [s] and place [m], its layer included."""
-_MapPoint = tuple[float, float]
 
 
 @dataclass(slots=True)
@@ -40,6 +46,8 @@ class _ObservedFlight:
     """The newest on each task."""
     visits: list[tuple[Claim, float, float | None]] = field(default_factory=list)
     """Claims that came to something, when that ended, and when it landed at a base [s]."""
+    decided_m: dict[float, MapPoint] = field(default_factory=dict)
+    """By the time of a decision [s], where it was then."""
     fixes: deque[_Fix] = field(default_factory=lambda: deque(maxlen=_KEPT))
     """Newest places in flight."""
     left_s: float | None = None
@@ -48,6 +56,39 @@ class _ObservedFlight:
     """Whether it stood at a base then: that is home, too."""
     home_s: float | None = None
     """When it was first heard to be home after that [s]."""
+
+    def executed(self, mission: Mission, uav: Uav, ways: FlownWays) -> tuple[ScheduleEntry, ...]:
+        """Its list, as far as it is known."""
+        tasks = {str(task.id): task for task in mission.tasks}
+        bases = {str(base.id): base for base in mission.bases}
+        here, entries = uav.position_enu_m, []
+        for claim, end_s, landed_s in self.visits:
+            here = self._departed(claim, here)
+            if claim.task is not None and claim.task in tasks:
+                entry, here = _visit(uav.id, tasks[claim.task], claim, here, end_s, ways)
+            elif claim.base is not None and claim.base in bases:
+                base = bases[claim.base]
+                via_m = (*ways.to_base(uav.id, here, base.id), base.position_enu_m[:2])
+                begin_s = end_s if landed_s is None else landed_s
+                times_s = claim.decided_s, begin_s, begin_s, end_s
+                entry = ScheduleEntry(at_base(BaseId(base.id)), here[:2], via_m, *times_s)
+                here = base.position_enu_m
+            else:
+                continue
+            entries.append(entry)
+        goes_home = entries and not self.left_at_base
+        if goes_home and self.left_s is not None and self.home_s is not None:
+            via_m = (*ways.to_start(uav.id, here), uav.position_enu_m[:2])
+            times_s = self.left_s, self.home_s, self.home_s, self.home_s
+            entries.append(ScheduleEntry(START, here[:2], via_m, *times_s))
+        return tuple(entries)
+
+    def _departed(self, claim: Claim, here: Point) -> Point:
+        """Where it set off: where its last visit ended, or where it was when it turned aside."""
+        east_m, north_m = self.decided_m.get(claim.decided_s, here[:2])
+        if math.hypot(east_m - here[0], north_m - here[1]) <= _STAYED_M:
+            return here
+        return east_m, north_m, here[2]
 
 
 class ObservedFlights:
@@ -108,6 +149,8 @@ class ObservedFlights:
         before, flight.claim = flight.claim, claim
         if claim.task is not None:
             flight.claims[claim.task] = claim
+        if flight.fixes and abs(flight.fixes[-1][0] - claim.decided_s) <= _FRESH_S:
+            flight.decided_m.setdefault(claim.decided_s, flight.fixes[-1][1][:2])
         if claim.phase is ClaimPhase.OUT and flight.left_s is None:
             flight.left_s = claim.decided_s
             flight.left_at_base = before is not None and before.stage in _ON_THE_GROUND
@@ -136,38 +179,20 @@ class ObservedFlights:
         flight = self._flights.get(uav)
         return 0 if flight is None else sum(claim.task is None for claim, _, _ in flight.visits)
 
-    def executed_schedule(self, mission: Mission) -> dict[UavId, tuple[ScheduleEntry, ...]]:
-        """Every UAV's list, as far as it is known."""
-        tasks = {str(task.id): task for task in mission.tasks}
-        bases = {str(base.id): base.position_enu_m for base in mission.bases}
-        schedule = {}
-        for uav in mission.uavs:
-            flight = self._flights.get(str(uav.id), _ObservedFlight())
-            here: _MapPoint = uav.position_enu_m[:2]
-            entries: list[ScheduleEntry] = []
-            for claim, end_s, landed_s in flight.visits:
-                if claim.task is not None and claim.task in tasks:
-                    entry, here = _visit(tasks[claim.task], claim, here, end_s)
-                elif claim.base is not None and claim.base in bases:
-                    there: _MapPoint = bases[claim.base][:2]
-                    begin_s = end_s if landed_s is None else landed_s
-                    times_s = claim.decided_s, begin_s, begin_s, end_s
-                    go = at_base(BaseId(claim.base))
-                    entry, here = ScheduleEntry(go, here, (there,), *times_s), there
-                else:
-                    continue
-                entries.append(entry)
-            if (
-                entries
-                and not flight.left_at_base
-                and flight.left_s is not None
-                and flight.home_s is not None
-            ):
-                home: _MapPoint = uav.position_enu_m[:2]
-                times_s = flight.left_s, flight.home_s, flight.home_s, flight.home_s
-                entries.append(ScheduleEntry(START, here, (home,), *times_s))
-            schedule[uav.id] = tuple(entries)
-        return schedule
+    def executed_schedule(
+        self, mission: Mission, problem: constrained.FieldProblem | None = None
+    ) -> dict[UavId, tuple[ScheduleEntry, ...]]:
+        """Every UAV's list, as far as it is known.
+
+        Args:
+            mission: as it was flown.
+            problem: the same, for ways and times along lines; None of a plain one.
+        """
+        ways = FlownWays(problem)
+        return {
+            uav.id: self._flights.get(str(uav.id), _ObservedFlight()).executed(mission, uav, ways)
+            for uav in mission.uavs
+        }
 
     def _compare(self, fixes: deque[_Fix], others: deque[_Fix]) -> None:
         """Look how near the newest piece of a way comes to another's."""
@@ -197,29 +222,31 @@ class ObservedFlights:
                 self.closest_approach_m = distance_m
 
 
-def _stands_at(place: Point, ground: Point) -> bool:
-    away_m = math.hypot(place[0] - ground[0], place[1] - ground[1])
-    return away_m <= _NEAR_GROUND_M and place[2] <= ground[2] + _LIFTED_M
-
-
 def _visit(
-    task: Task, claim: Claim, here: _MapPoint, end_s: float
-) -> tuple[ScheduleEntry, _MapPoint]:
-    """One visit, begun as late as its service lets it; and where it ends."""
+    uav: str, task: Task, claim: Claim, here: Point, end_s: float, ways: FlownWays
+) -> tuple[ScheduleEntry, Point]:
+    """One visit, begun as late as its line and service let it; and where it ends."""
     points = task.path_enu_m or (task.position_enu_m,)
-    ends = points[:: -1 if claim.reversed else 1]
-    begin_s = end_s - task.service_s
+    backwards = bool(claim.reversed)
+    ends = points[:: -1 if backwards else 1]
+    begin_s = end_s - task.service_s - ways.line_s(uav, task.id, backwards=backwards)
+    begin_s = max(begin_s, min(claim.decided_s, end_s - task.service_s))
     entry = ScheduleEntry(
         go=task.id,
-        from_enu_m=here,
-        via_enu_m=(ends[0][:2],),
+        from_enu_m=here[:2],
+        via_enu_m=(*ways.to_task(uav, here, task.id, backwards=backwards), ends[0][:2]),
         depart_s=min(claim.decided_s, begin_s),
         arrive_s=begin_s,
         begin_s=begin_s,
         end_s=end_s,
-        is_reversed=bool(claim.reversed),
+        is_reversed=backwards,
     )
-    return entry, ends[-1][:2]
+    return entry, ends[-1]
+
+
+def _stands_at(place: Point, ground: Point) -> bool:
+    away_m = math.hypot(place[0] - ground[0], place[1] - ground[1])
+    return away_m <= _NEAR_GROUND_M and place[2] <= ground[2] + _LIFTED_M
 
 
 def _at(begin: _Fix, end: _Fix, at_s: float) -> Point:

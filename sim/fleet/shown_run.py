@@ -100,9 +100,7 @@ class ShownRun:
             wall_s=flight.wall_s,
             speedup=self._speedup,
             fates=flight.fates,
-            executed_schedule=flight.mission_state.flights.executed_schedule(
-                flight.mission_state.mission
-            ),
+            executed_schedule=flight.mission_state.executed_schedule(),
             closest_approach_m=flight.mission_state.flights.closest_approach_m,
             security=security_of(options, self._mission, flight.dropped),
         )

@@ -47,7 +47,7 @@ def way_to(problem: FieldProblem, uav: int, place_enu_m: Sequence[float], node: 
         problem: made of a mission, so that places are known.
         uav: its row.
         place_enu_m: where it is [m], without its height layer.
-        node: where to; see `start_node`, `base_node` and `task_nodes`.
+        node: where to: a row of its start, or see `base_node` and `task_nodes`.
     """
     corners_m = problem.corners_from_m(uav, place_enu_m, node)
     duration_s = float(problem.legs_from_s(uav, place_enu_m)[node])
@@ -74,11 +74,6 @@ def way_home(problem: FieldProblem, uav: int, place_enu_m: Sequence[float]) -> W
     legs_s = problem.legs_from_s(uav, place_enu_m)
     ends = [uav, *range(problem.n_uav, problem.n_uav + problem.n_base)]
     return way_to(problem, uav, place_enu_m, ends[int(np.argmin(legs_s[ends]))])
-
-
-def start_node(uav: int) -> int:
-    """Node of the start of row ``uav``."""
-    return uav
 
 
 def base_node(problem: FieldProblem, base: str) -> int:

@@ -17,6 +17,7 @@ from swarm.protocol.uav_messages import (
     Status,
     StatusPhase,
 )
+from tests.support.observed_mission import shipped
 
 UAVS = tuple(Uav(UavId(f"u{n}"), (0.0, 10.0 * n, 0.0), 10.0) for n in range(2))
 LINE = ((20.0, 0.0, 0.0), (40.0, 0.0, 0.0), (40.0, 30.0, 0.0))
@@ -44,6 +45,47 @@ def test_a_plain_flight_is_told_as_its_vehicles_flew_it() -> None:
             assert (one.depart_s, one.begin_s) == pytest.approx((other.depart_s, other.begin_s))
             assert one.end_s == pytest.approx(other.end_s)
             assert (one.from_enu_m, one.via_enu_m) == (other.from_enu_m, other.via_enu_m)
+
+
+def test_a_flight_of_the_field_is_told_with_its_corners_and_lines() -> None:
+    mission = shipped("reservoir-inspection")
+    world = simulate_mission(mission, method="guided", seed=0, uncertainty=Uncertainty()).world
+    told, flown = world.mission_state.executed_schedule(), world.executed_schedule()
+
+    corners = 0
+    for uav, entries in flown.items():
+        work = [entry for entry in entries if entry.go in mission_tasks(mission)]
+        seen = [entry for entry in told[uav] if entry.go in mission_tasks(mission)]
+        assert [entry.go for entry in seen] == [entry.go for entry in work]
+        for one, other in zip(seen, work, strict=True):
+            assert one.end_s == pytest.approx(other.end_s)
+            assert one.begin_s == pytest.approx(other.begin_s, abs=0.5)
+            assert one.is_reversed == other.is_reversed
+            assert one.from_enu_m == pytest.approx(other.from_enu_m, abs=0.1)
+            assert len(one.via_enu_m) == len(other.via_enu_m)
+            for point, true in zip(one.via_enu_m, other.via_enu_m, strict=True):
+                assert point == pytest.approx(true, abs=0.1)
+            corners += len(one.via_enu_m) - 1
+    assert corners > 0
+
+
+def mission_tasks(mission: Mission) -> set[str]:
+    return {str(task.id) for task in mission.tasks}
+
+
+def test_who_turned_aside_in_flight_set_off_from_there() -> None:
+    flights = ObservedFlights()
+    flights.hear("u0", Claim(ClaimPhase.HELD, "t0", 0.0, 0, 7.0))
+    for at_s in (1.0, 2.0, 3.0):
+        flights.hear_status("u0", status(StatusPhase.FLYING, at_s, 10.0 * at_s), 10.0)
+    for _ in range(2):  # said again when it is held, from farther on
+        flights.hear("u0", Claim(ClaimPhase.HELD, "line", 3.1, 0, 40.0))
+        flights.hear_status("u0", status(StatusPhase.FLYING, 4.0, 25.0), 10.0)
+    flights.hear("u0", Outcome("line", AttemptResult.DONE, 1, 40.0))
+
+    (entry,) = flights.executed_schedule(MISSION)[UavId("u0")]
+
+    assert (entry.go, entry.depart_s, entry.from_enu_m) == ("line", 3.1, (30.0, 0.0))
 
 
 def test_swaps_lines_and_the_way_home_are_told() -> None:
