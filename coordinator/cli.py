@@ -38,6 +38,7 @@ if TYPE_CHECKING:
 
     from rich.status import Status
 
+    from coordinator.core.lifecycle import MakePlan
     from coordinator.daemon import CoordinatorProcess
     from coordinator.planner.options import ShouldStop
     from swarm.model import Mission, Plan
@@ -379,20 +380,27 @@ def coordinator(
     return _serve(service, page, store, standby=standby, lifeline=lifeline)
 
 
-def _planned(mission: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
+def _planned(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
     from coordinator.planner.plan import make_plan
     from swarm.runtime.clock import SystemClock
 
-    return make_plan(mission, method, clock=SystemClock(), seed=seed, stop=unwanted)
+    return make_plan(
+        wanted.mission,
+        wanted.method,
+        clock=SystemClock(),
+        seed=wanted.seed,
+        stop=unwanted,
+        rates=wanted.rates,
+    )
 
 
-def _printed_plan(mission: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
+def _printed_plan(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
     """The same, printed unless nobody wants it any more."""
     from json import dumps
 
     from coordinator.planner.plan_report import plan_as_json
 
-    made = _planned(mission, method, seed, unwanted)
+    made = _planned(wanted, unwanted)
     if not unwanted(0.0):
         print(dumps(plan_as_json(made), allow_nan=False), flush=True)
     return made

@@ -43,7 +43,7 @@ from swarm.runtime.process import SERVICE_NOTIFIER, call_in_background
 from swarm.runtime.shell import Shell, join_mission
 from swarm.runtime.store import Store
 
-MissionPlanner = Callable[[Mission, str, int, ShouldStop], Plan]
+MissionPlanner = Callable[[MakePlan, ShouldStop], Plan]
 T = TypeVar("T")
 
 
@@ -121,7 +121,7 @@ class BackgroundPlanner:
     """Plans beside a core, on threads that do not hold the process up; one plan at a time.
 
     Args:
-        make_plan: plans a mission by method and seed; told to stop once nobody waits for the plan.
+        make_plan: plans a mission as it is wanted; told to stop once nobody waits for the plan.
         tell: takes the plan.
         fail: takes what a planner raises, unless it says that there is no plan.
     """
@@ -157,7 +157,7 @@ class BackgroundPlanner:
 
     async def _plan(self, request: MakePlan) -> None:
         def call(unwanted: ShouldStop) -> Plan:
-            return self._make_plan(request.mission, request.method, request.seed, unwanted)
+            return self._make_plan(request, unwanted)
 
         try:
             made = await _planned_beside(call, "planner")

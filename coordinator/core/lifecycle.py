@@ -8,14 +8,15 @@ does not want waited for not at all. Who gets ready later joins the mission that
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import Enum
 
 from coordinator.planner.online import EpochPolicy, ReplanResult, Situation
 from swarm.model import Mission, Plan, Uav, UavId
 from swarm.model.layers import FlightLayers
 from swarm.protocol.board import TaskBoard, TaskState, doable, is_of_field, mission_of
+from swarm.protocol.calibration import FlightRates, flight_rates, noticeably_otherwise
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
 from swarm.protocol.field_board import doable_in_field
 from swarm.protocol.field_messages import ZoneSpec
@@ -51,6 +52,8 @@ class MakePlan:
     mission: Mission
     method: str
     seed: int
+    rates: Mapping[str, FlightRates] = field(default_factory=dict)
+    """UAVs of which it is known that they fly otherwise than the mission says, and how."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,6 +149,8 @@ class StartGate:
         self._planned_for: tuple[UavId, ...] = ()
         self._planned_tasks: set[str] = set()
         self._planned_zones: tuple[ZoneSpec, ...] = ()
+        self.rates: Mapping[str, FlightRates] = {}
+        """How UAVs fly by what the plan was made with."""
         self._request = 0
 
     def begin(self, now_s: float) -> list[CoordinatorAction]:
@@ -184,6 +189,10 @@ class StartGate:
         settled = (ClaimPhase.IDLE, ClaimPhase.OUT, ClaimPhase.PAUSED)
         missing = [uav for uav in uavs if phases[uav] not in settled]
         self._look(uavs, ready, now_s)
+        if self.plan is not None and self._is_otherwise:
+            # Mostly while vehicles get ready: they tell it as soon as they are briefed.
+            note = LogLine("plans anew", {"because": "UAVs have told how they fly"})
+            return StartDecision.WAIT, [note, *self._make_plan(self._planned_for)]
         if missing and self._start_by_s is not None:
             given_up = dispensable(self._replica)
             needed = [uav for uav in missing if uav not in given_up]
@@ -268,6 +277,10 @@ class StartGate:
     def _open_tasks(self) -> set[str]:
         return {task for task, entry in self._replica.board.items() if not entry.withdrawn}
 
+    @property
+    def _is_otherwise(self) -> bool:
+        return bool(noticeably_otherwise(self.rates, flight_rates(self._replica)))
+
     def _phase_of(self, uav: str) -> ClaimPhase | None:
         """Phase of its claim; None while it has none, or is absent without having left."""
         claim = self._replica.claims.get(uav)
@@ -280,6 +293,7 @@ class StartGate:
         self._request += 1
         self._planned_for, self._planned_tasks, self.plan = uavs, self._open_tasks, None
         self._planned_zones = zones_in_force(self._replica)
+        self.rates = flight_rates(self._replica)
         brief = self._replica.brief
         if brief is None:
             return []
@@ -296,7 +310,7 @@ class StartGate:
             # What is known of it may have no constraints, or not yet: its plan has a schedule.
             schema=max(mission.schema, self._mission.schema),
         )
-        return [MakePlan(self._request, mission, self._method, self._seed)]
+        return [MakePlan(self._request, mission, self._method, self._seed, self.rates)]
 
 
 def _in_layers(fleet: Sequence[Uav], brief: MissionConfig) -> tuple[Uav, ...]:

@@ -33,7 +33,7 @@ from coordinator.mission_view.wording import listed
 from coordinator.planner.online import EpochPolicy, Situation, complete_lists, worth_to_go
 from swarm.model import Mission
 from swarm.protocol.board import TaskBoard
-from swarm.protocol.calibration import AS_BRIEFED
+from swarm.protocol.calibration import noticeably_otherwise
 from swarm.protocol.events import Finish, LogLine
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import MissionPhase, PlanEpoch
@@ -259,8 +259,8 @@ class StagedMission:
         self._announcer.set_zero(now_s)
         actions.append(self._announcer.say(self.gate.epoch(MissionPhase.RUNNING, self.gate.reason)))
         situation = self._situation(now_s)
-        if situation is not None:  # the plan was made as the brief has it
-            situation = replace(situation, rates=())
+        if situation is not None:  # the plan was made by what was known before
+            situation = replace(situation, rates=tuple(sorted(self.gate.rates.items())))
         self.replan_policy.begin(situation, self.gate.completion_s, now_s)
         return actions
 
@@ -414,7 +414,7 @@ class ReplanPolicy:
             "withdrawn": now.withdrawn - before.withdrawn,
         }
         reasons = [f"{listed(sorted(ids), 3)} {what}" for what, ids in changes.items() if ids]
-        if otherwise := _calibrated(before, now):
+        if otherwise := noticeably_otherwise(dict(before.rates), dict(now.rates)):
             reasons.append(f"{listed(otherwise, 3)} flies otherwise than was known")
         if now.zones != before.zones:
             reasons.append("the operator has changed zones")
@@ -436,20 +436,3 @@ class ReplanPolicy:
             if task in self._expected_s
         ]
         return float(np.mean(late_s)) / left_s if late_s else 0.0
-
-
-_UPRIGHT_S = 5.0
-"""Of landing and climbing together, that is noticeable [s]."""
-
-
-def _calibrated(before: Situation, now: Situation) -> list[str]:
-    """UAVs that have measured that they fly noticeably otherwise than was known."""
-    known, found = dict(before.rates), dict(now.rates)
-    return [
-        uav
-        for uav in sorted(known.keys() | found.keys())
-        for old, new in [(known.get(uav, AS_BRIEFED), found.get(uav, AS_BRIEFED))]
-        if abs(new.time_frac / old.time_frac - 1.0) > DRIFT_FRAC
-        or abs(new.drain_frac / old.drain_frac - 1.0) > DRIFT_FRAC
-        or abs(new.land_s + new.climb_s - old.land_s - old.climb_s) > _UPRIGHT_S
-    ]

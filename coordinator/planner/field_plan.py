@@ -6,8 +6,9 @@ due time left out, then largest J). Pop-ups are unknown to a plan.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,6 +38,9 @@ from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError
 
+if TYPE_CHECKING:
+    from swarm.protocol.calibration import FlightRates
+
 FIELD_METHODS = (*FIELD_RULES, "guided", "exact")
 _PROOF_S = 1.0
 """The optimum is proven beside any method when that is estimated to take at most this long."""
@@ -60,6 +64,7 @@ class FieldRequest:
     bound_frac: float
     threads: int | None
     modest: bool
+    rates: Mapping[str, FlightRates]
 
 
 def is_field(mission: Mission) -> bool:
@@ -76,7 +81,7 @@ def make_field_plan(asked: FieldRequest) -> Plan:
     """
     method = _field_method(asked)
     begin_s = asked.clock.now_s()
-    problem = _problem_of(asked.mission)
+    problem = _problem_of(asked.mission, asked.rates)
     ends = never if asked.stop is None else asked.stop
     search = _FieldSearch(problem, method, asked, ends)
     optimum = search.optimum()
@@ -107,12 +112,18 @@ def make_field_plan(asked: FieldRequest) -> Plan:
     return replace(plan, elapsed_s=asked.clock.now_s() - begin_s)
 
 
-def _problem_of(mission: Mission) -> FieldProblem:
+def _problem_of(mission: Mission, rates: Mapping[str, FlightRates]) -> FieldProblem:
     try:
-        return FieldProblem.from_mission(mission.known_at_start())
+        problem = FieldProblem.from_mission(mission.known_at_start())
     except TooManyLegsError as error:
         remedy = "fly fewer tasks at a time, or UAVs that are alike"
         raise InputError(Fault(f"mission {mission.name}", "", str(error), remedy)) from error
+    if not rates:
+        return problem
+    # Planning on the desk loads no registers.
+    from swarm.protocol.calibration import field_as_flown
+
+    return field_as_flown(problem, rates)
 
 
 def _field_method(asked: FieldRequest) -> str:

@@ -6,8 +6,9 @@ Pop-ups (tasks with ``appears_s > 0``) are unknown to a plan.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -37,6 +38,9 @@ from swarm.model import Mission, Plan, TaskId, UavId
 from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
+
+if TYPE_CHECKING:
+    from swarm.protocol.calibration import FlightRates
 
 ONLINE_METHODS = (*RULE_NAMES, GuidedRule.name)
 """Those whose rule agents can follow by themselves."""
@@ -167,6 +171,7 @@ def make_plan(
     bound_frac: float = 0.0,
     threads: int | None = None,
     modest: bool = False,
+    rates: Mapping[str, FlightRates] | None = None,
 ) -> Plan:
     """Plan a mission.
 
@@ -185,6 +190,8 @@ def make_plan(
         bound_frac: share of a limit that is kept for that bound, within 0..1.
         threads: at most this many, of processors if None; changes nothing but speed.
         modest: search little for a sequence; costs 0.1 % of J at 10 × 50, saves most of the time.
+        rates: of UAVs of which it is known that they fly otherwise than a mission in the field
+            says.
 
     Returns:
         The plan; without a sequence for ``exact``, which has none. Where the limit came before the
@@ -202,7 +209,7 @@ def make_plan(
         from coordinator.planner.field_plan import FieldRequest, make_field_plan
 
         limits = (seed, stop, progress, bound_s, bound_frac, threads, modest)
-        return make_field_plan(FieldRequest(mission, method, clock, *limits))
+        return make_field_plan(FieldRequest(mission, method, clock, *limits, rates or {}))
     begin_s = clock.now_s()
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop

@@ -31,6 +31,9 @@ DRAIN_FRAC_RANGE: Final = (0.8, 3.0)
 """What is believed of batteries: that one lasts far longer than it should less than the reverse."""
 LONGEST_VERTICAL_S: Final = 300.0
 """What is believed of landing and of climbing at most [s]."""
+_NOTICEABLE_FRAC: Final = 0.05
+_NOTICEABLE_S: Final = 5.0
+"""Of landing and climbing together [s]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +91,23 @@ def flight_rates(replica: Replica) -> dict[str, FlightRates]:
         return {}
     believed = {uav: FlightRates.believed(told) for uav, told in replica.calibrations.items()}
     return {uav: rates for uav, rates in believed.items() if rates != AS_BRIEFED}
+
+
+def noticeably_otherwise(
+    known: Mapping[str, FlightRates], found: Mapping[str, FlightRates]
+) -> list[str]:
+    """UAVs that fly so far otherwise than was known that plans for them should be made anew."""
+    pairs = {
+        uav: (known.get(uav, AS_BRIEFED), found.get(uav, AS_BRIEFED))
+        for uav in sorted(known.keys() | found.keys())
+    }
+    return [
+        uav
+        for uav, (old, new) in pairs.items()
+        if abs(new.time_frac / old.time_frac - 1.0) > _NOTICEABLE_FRAC
+        or abs(new.drain_frac / old.drain_frac - 1.0) > _NOTICEABLE_FRAC
+        or abs(new.land_s + new.climb_s - old.land_s - old.climb_s) > _NOTICEABLE_S
+    ]
 
 
 def fleet_as_flown(fleet: Mission, rates: Mapping[str, FlightRates]) -> Mission:

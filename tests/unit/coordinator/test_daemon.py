@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator, Callable, Sequence
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -12,7 +12,8 @@ from functools import partial
 import pytest
 
 from coordinator.core.active import CoordinatorCore
-from coordinator.daemon import run_coordinator
+from coordinator.core.lifecycle import MakePlan
+from coordinator.daemon import MissionPlanner, run_coordinator
 from coordinator.planner.options import ShouldStop
 from swarm.bus.port import BusEvent, Sample
 from swarm.model import Mission, Plan, UavId
@@ -31,17 +32,17 @@ from tests.support.shell_play import LIMIT_S, HandClock, play, take_until, until
 
 KEYS = KeySpace(MISSION)
 WHOLE = mission([uav("u0")], [task("t0", 1.0)])
-MakePlan = Callable[[Mission, str, int, ShouldStop], Plan]
 
 
 class OwnError(Exception):
     """Stands for a bug."""
 
 
-def planned(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
-    sequence = tuple(UavId(each.id) for each in what.uavs)
+def planned(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
+    sequence = tuple(UavId(each.id) for each in wanted.mission.uavs)
     routes = dict.fromkeys(sequence, ())
-    return Plan(what.name, method, routes, 0.0, {}, sequence, None, 1, 0.0, seed)
+    name = wanted.mission.name
+    return Plan(name, wanted.method, routes, 0.0, {}, sequence, None, 1, 0.0, wanted.seed)
 
 
 @dataclass(slots=True)
@@ -71,7 +72,9 @@ class Played:
 
 
 @asynccontextmanager
-async def at_work(make_plan: MakePlan = planned, flown: Mission = WHOLE) -> AsyncIterator[Played]:
+async def at_work(
+    make_plan: MissionPlanner = planned, flown: Mission = WHOLE
+) -> AsyncIterator[Played]:
     """The coordinator of ``flown``, by one UAV."""
     network = MemoryNetwork()
     observer = network.join("onlooker")
@@ -118,9 +121,10 @@ def test_brief_and_board_are_said_at_once() -> None:
 def test_the_planner_is_asked_for_the_mission_as_it_is_known_off_the_loops_thread() -> None:
     asked: list[tuple[Mission, str, int, bool]] = []
 
-    def make_plan(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
-        asked.append((what, method, seed, threading.current_thread() is threading.main_thread()))
-        return planned(what, method, seed, unwanted)
+    def make_plan(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
+        on_loop = threading.current_thread() is threading.main_thread()
+        asked.append((wanted.mission, wanted.method, wanted.seed, on_loop))
+        return planned(wanted, unwanted)
 
     async def scenario() -> None:
         async with at_work(make_plan) as played:
@@ -151,7 +155,7 @@ def test_a_mission_is_flown_to_its_end() -> None:
 
 
 def test_a_mission_that_cannot_be_planned_ends_with_the_reason() -> None:
-    def make_plan(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
+    def make_plan(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
         raise ValueError("no UAV can do it")
 
     async def scenario() -> None:
@@ -165,7 +169,7 @@ def test_a_mission_that_cannot_be_planned_ends_with_the_reason() -> None:
 
 
 def test_a_bug_in_the_planner_ends_the_coordinator_with_it() -> None:
-    def make_plan(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
+    def make_plan(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
         raise OwnError
 
     async def scenario() -> None:
@@ -179,13 +183,13 @@ def test_a_bug_in_the_planner_ends_the_coordinator_with_it() -> None:
 def test_a_plan_under_way_does_not_outlive_the_coordinator() -> None:
     begun, told, may_end = threading.Event(), threading.Event(), threading.Event()
 
-    def make_plan(what: Mission, method: str, seed: int, unwanted: ShouldStop) -> Plan:
+    def make_plan(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
         begun.set()
         while not (unwanted(0.0) or may_end.wait(0.01)):
             pass
         if unwanted(0.0):
             told.set()
-        return planned(what, method, seed, unwanted)
+        return planned(wanted, unwanted)
 
     async def scenario() -> None:
         async with at_work(make_plan) as played:

@@ -19,12 +19,13 @@ from swarm.allocation.field import FieldProblem
 from swarm.model import Base, BaseId, Mission, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.board import TaskBoard, is_of_field, mission_of
+from swarm.protocol.calibration import FlightRates
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.field_messages import UavReady, ZoneEdit, ZoneSpec
 from swarm.protocol.messages import Body, MissionConfig, MissionPhase, TaskEntry
 from swarm.protocol.registers import Replica
-from swarm.protocol.uav_messages import BaseStage
+from swarm.protocol.uav_messages import BaseStage, Calibration
 from swarm.scenario import load_scenario, resolve_scenario
 from tests.support.builders import (
     IDLE,
@@ -184,6 +185,26 @@ def test_before_the_start_it_plans_anew_round_a_zone() -> None:
 
     coordinator.answer_plan("u1", "u0")
     assert coordinator.phase is MissionPhase.RUNNING
+
+
+def test_the_first_plan_reckons_with_what_vehicles_tell_of_landing_and_climbing() -> None:
+    battery = replace(U0, endurance_s=300.0)
+    coordinator = LoneCoordinator(mission([battery, U1], [task("t0", 50.0)]))
+    coordinator.hear("u0", Calibration(1.0, 1.0, 0, 23.0, 12.0))
+    first, *_ = plans_wanted(coordinator.log)
+    coordinator.answer_plan("u0", "u1")
+    *_, wanted = plans_wanted(coordinator.log)
+    assert first.rates == {}
+    assert wanted.rates == {"u0": FlightRates(1.0, 1.0, 23.0, 12.0)}
+    assert [uav.id for uav in wanted.mission.uavs] == ["u0", "u1"]
+
+    coordinator.answer_plan("u1", "u0")
+    coordinator.hear("u0", Calibration(1.0, 1.0, 0, 24.0, 13.0))
+    assert plans_wanted(coordinator.log)[-1] == wanted, "hardly otherwise"
+    coordinator.ready("u0", "u1")
+    assert coordinator.phase is MissionPhase.RUNNING
+    coordinator.run_until(120.0)
+    assert replans(coordinator) == [], "the plan knows it already"
 
 
 def test_a_plan_without_constraints_is_of_the_schema_of_the_file() -> None:

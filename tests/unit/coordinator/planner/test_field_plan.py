@@ -16,7 +16,8 @@ from coordinator.planner.plan_report import plan_as_json, plan_from_json
 from swarm.allocation.field import FieldProblem, FieldState
 from swarm.kernels.field import FIELD_GREEDY, run_rule
 from swarm.model import Mission, TaskId
-from swarm.model.plan import LeftOut
+from swarm.model.plan import LeftOut, at_base
+from swarm.protocol.calibration import FlightRates
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario, resolve_scenario
@@ -126,6 +127,33 @@ def test_a_plan_that_is_stopped_at_once_is_no_worse_than_greedy_decisions(method
     assert sum(greedy) >= 8
     assert [len(route) for route in stopped.routes.values()] == greedy
     assert stopped.evaluations == 0
+
+
+def test_a_plan_made_for_how_uavs_fly_has_landing_and_climbing_in_its_times() -> None:
+    mission = load_scenario(resolve_scenario("reservoir-inspection"))
+    rates = {uav.id: FlightRates(land_s=20.0, climb_s=10.0) for uav in mission.uavs}
+    stop = after_evaluations(2_000)
+    made = make_plan(mission, "guided", clock=SystemClock(), stop=stop, rates=rates)
+
+    assert made.schedule is not None
+    problem = FieldProblem.from_mission(mission)
+    nodes = {at_base(base): node for node, base in enumerate(problem.base_ids, problem.n_uav)}
+    swaps = 0
+    for uav, entries in enumerate(made.schedule.values()):
+        for entry, after in pairwise(entries):
+            if entry.go in nodes and after.go in problem.task_ids:
+                task = problem.task_ids.index(TaskId(after.go))
+                enter = problem.enter[task, int(after.is_reversed)]
+                leg_s = problem.leg_s[problem.kind[uav], nodes[entry.go], enter]
+                assert after.arrive_s - after.depart_s == pytest.approx(leg_s + 10.0)
+                swaps += 1
+        last, home = entries[-2:]
+        if last.base is None:
+            task = problem.task_ids.index(TaskId(last.go))
+            leave = problem.enter[task, 1 - int(last.is_reversed)]
+            leg_s = problem.leg_s[problem.kind[uav], leave, nodes.get(home.go, uav)]
+            assert home.arrive_s - home.depart_s == pytest.approx(leg_s + 20.0)
+    assert swaps > 0
 
 
 def test_methods_that_heed_nothing_of_the_field_say_so() -> None:
