@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import gc
 from collections import Counter
 from collections.abc import Awaitable, Callable, Iterator, Mapping
 from typing import Protocol
@@ -166,9 +165,6 @@ async def live_once(
         lifeline: whether the end of standard input ends the process.
         on_wait: called with the reason whenever there was no seat.
     """
-    # What has been imported stays: a full collection would look through all of it for tens of
-    # milliseconds, in which a vehicle may wait for its next target.
-    gc.freeze()
     async with stop_requests(lifeline=lifeline) as stop:
         SERVICE_NOTIFIER.waiting(f"{uav}: looks for the bus")
         seat = await seat_or_stop(open_bus, stop, on_wait)

@@ -15,7 +15,6 @@ its traceback and 1.
 from __future__ import annotations
 
 import errno
-import gc
 import inspect
 import os
 import re
@@ -28,14 +27,12 @@ from typing import Annotated, Any
 import typer.main
 
 import swarm
+from swarm.runtime import garbage
 from swarm.runtime.console import Panels, explain_family, help_text, say
 from swarm.runtime.errors import EXIT_INTERRUPTED, Fault, InputError, SwarmError
 from swarm.runtime.extras import missing_extra
 
 COMMAND_GROUP = "peckorder.commands"
-_NEW_THINGS = 20_000
-"""After so many more of them the first generation is searched for garbage in circles. A start makes
-hardly anything else than what stays: at 700, as usual, searching it takes a tenth of its time."""
 _CHECK = "--check"
 _COMPLETE = "_SWARM_COMPLETE"
 """Environment variable by which shells, and the library, ask for completions."""
@@ -109,7 +106,7 @@ def check(arguments: Sequence[str]) -> Mapping[str, Any]:
 
 def console_main() -> int:
     """Entry point of the console script; says so when its output could not be written."""
-    gc.set_threshold(_NEW_THINGS, *gc.get_threshold()[1:])
+    garbage.begin_start()
     status = main()
     try:
         if sys.stdout is not None:  # None when the caller has closed it

@@ -18,6 +18,7 @@ from collections.abc import AsyncIterator, Callable, Coroutine, Mapping
 from concurrent.futures import Future
 from typing import Any, Final, NoReturn, TypeVar
 
+from swarm.runtime import garbage
 from swarm.runtime.errors import EXIT_INTERRUPTED
 
 STDIN_FD = 0
@@ -193,8 +194,9 @@ async def stop_requests(*, lifeline: bool) -> AsyncIterator[StopRequest]:
     For daemons that have something to finish first, such as bringing a vehicle
     home. Use from the main thread. The first SIGINT asks; another one, a second or
     more later, kills. A service manager, if there is one, is shown meanwhile that the
-    event loop turns.
+    event loop turns. What has been imported by then stays.
     """
+    garbage.end_start()
     loop = asyncio.get_running_loop()
     stop = StopRequest()
     sigint_before = signal.getsignal(signal.SIGINT)
