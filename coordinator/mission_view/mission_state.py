@@ -289,7 +289,7 @@ class MissionState:
         if not self.replica.join(message):
             return
         self._clock.heed(message.body, brief, epoch)
-        self.flights.hear(writer, message.body)
+        self.flights.hear(writer, message.body, self.mission_s(now_s))
         match message.body:
             case PlanEpoch() as epoch:
                 self._hear_epoch(epoch, now_s)

@@ -29,7 +29,7 @@ _LIFTED_M = 1.0
 """Above the ground, from where on a vehicle is in the air; heights drift by less."""
 
 _FRESH_S = 2.0
-"""From the time of a decision: a place told then is where it was made."""
+"""From the time of a decision: what is told then is of that moment."""
 _STAYED_M = 5.0
 """From where the last visit ended: who is that near has waited there."""
 
@@ -48,6 +48,8 @@ class _ObservedFlight:
     """Claims that came to something, when that ended, and when it landed at a base [s]."""
     decided_m: dict[float, MapPoint] = field(default_factory=dict)
     """By the time of a decision [s], where it was then."""
+    departed_s: dict[tuple[str | None, float], float] = field(default_factory=dict)
+    """By task, None for a base, and since when it was free for it, when it set off [s]."""
     fixes: deque[_Fix] = field(default_factory=lambda: deque(maxlen=_KEPT))
     """Newest places in flight."""
     left_s: float | None = None
@@ -64,13 +66,14 @@ class _ObservedFlight:
         here, entries = uav.position_enu_m, []
         for claim, end_s, landed_s in self.visits:
             here = self._departed(claim, here)
+            since_s = self.departed_s.get((claim.task, claim.decided_s), claim.decided_s)
             if claim.task is not None and claim.task in tasks:
-                entry, here = _visit(uav.id, tasks[claim.task], claim, here, end_s, ways)
+                entry, here = _visit(uav.id, tasks[claim.task], claim, here, (since_s, end_s), ways)
             elif claim.base is not None and claim.base in bases:
                 base = bases[claim.base]
                 via_m = (*ways.to_base(uav.id, here, base.id), base.position_enu_m[:2])
                 begin_s = end_s if landed_s is None else landed_s
-                times_s = claim.decided_s, begin_s, begin_s, end_s
+                times_s = since_s, begin_s, begin_s, end_s
                 entry = ScheduleEntry(at_base(BaseId(base.id)), here[:2], via_m, *times_s)
                 here = base.position_enu_m
             else:
@@ -133,22 +136,27 @@ class ObservedFlights:
             if other != uav:
                 self._compare(flight.fixes, rival.fixes)
 
-    def hear(self, writer: str, body: object) -> None:
-        """Somebody says something that was not known."""
+    def hear(self, writer: str, body: object, mission_s: float | None = None) -> None:
+        """Somebody says something that was not known, at that mission time where it is known."""
         match body:
             case Claim():
-                self._hear_claim(writer, body)
+                self._hear_claim(writer, body, mission_s)
             case Outcome():
                 self._hear_outcome(writer, body)
             case _:
                 pass
 
-    def _hear_claim(self, uav: str, claim: Claim) -> None:
+    def _hear_claim(self, uav: str, claim: Claim, mission_s: float | None) -> None:
         """A UAV says what it is about."""
         flight = self._flights.setdefault(uav, _ObservedFlight())
         before, flight.claim = flight.claim, claim
         if claim.task is not None:
             flight.claims[claim.task] = claim
+        if claim.departs_s is None and (claim.task is not None or claim.base is not None):
+            # Who has waited without anything to do sets off when it says what it is about.
+            waited = mission_s is not None and mission_s > claim.decided_s + _FRESH_S
+            since_s = mission_s if waited and mission_s is not None else claim.decided_s
+            flight.departed_s.setdefault((claim.task, claim.decided_s), since_s)
         if flight.fixes and abs(flight.fixes[-1][0] - claim.decided_s) <= _FRESH_S:
             flight.decided_m.setdefault(claim.decided_s, flight.fixes[-1][1][:2])
         if claim.phase is ClaimPhase.OUT and flight.left_s is None:
@@ -223,19 +231,20 @@ class ObservedFlights:
 
 
 def _visit(
-    uav: str, task: Task, claim: Claim, here: Point, end_s: float, ways: FlownWays
+    uav: str, task: Task, claim: Claim, here: Point, times_s: tuple[float, float], ways: FlownWays
 ) -> tuple[ScheduleEntry, Point]:
-    """One visit, begun as late as its line and service let it; and where it ends."""
+    """One visit from departure to end, begun as late as its line and service let it; and where."""
+    depart_s, end_s = times_s
     points = task.path_enu_m or (task.position_enu_m,)
     backwards = bool(claim.reversed)
     ends = points[:: -1 if backwards else 1]
     begin_s = end_s - task.service_s - ways.line_s(uav, task.id, backwards=backwards)
-    begin_s = max(begin_s, min(claim.decided_s, end_s - task.service_s))
+    begin_s = max(begin_s, min(depart_s, end_s - task.service_s))
     entry = ScheduleEntry(
         go=task.id,
         from_enu_m=here[:2],
         via_enu_m=(*ways.to_task(uav, here, task.id, backwards=backwards), ends[0][:2]),
-        depart_s=min(claim.decided_s, begin_s),
+        depart_s=min(depart_s, begin_s),
         arrive_s=begin_s,
         begin_s=begin_s,
         end_s=end_s,

@@ -88,6 +88,17 @@ def test_who_turned_aside_in_flight_set_off_from_there() -> None:
     assert (entry.go, entry.depart_s, entry.from_enu_m) == ("line", 3.1, (30.0, 0.0))
 
 
+def test_who_had_nothing_to_do_for_a_while_sets_off_when_it_says_so() -> None:
+    flights = ObservedFlights()
+    for mission_s, phase in ((30.0, ClaimPhase.PROPOSED), (30.4, ClaimPhase.HELD)):
+        flights.hear("u0", Claim(phase, "t0", 10.0, 0, 37.0), mission_s)
+    flights.hear("u0", Outcome("t0", AttemptResult.DONE, 1, 37.0), 37.0)
+
+    (entry,) = flights.executed_schedule(MISSION)[UavId("u0")]
+
+    assert (entry.depart_s, entry.begin_s, entry.end_s) == (30.0, 35.0, 37.0)
+
+
 def test_swaps_lines_and_the_way_home_are_told() -> None:
     flights = ObservedFlights()
     approach = Claim(

@@ -131,7 +131,7 @@ def test_a_plan_that_is_stopped_at_once_is_no_worse_than_greedy_decisions(method
 
 def test_a_plan_made_for_how_uavs_fly_has_landing_and_climbing_in_its_times() -> None:
     mission = load_scenario(resolve_scenario("reservoir-inspection"))
-    rates = {uav.id: FlightRates(land_s=20.0, climb_s=10.0) for uav in mission.uavs}
+    rates = {str(uav.id): FlightRates(land_s=20.0, climb_s=10.0) for uav in mission.uavs}
     stop = after_evaluations(2_000)
     made = make_plan(mission, "guided", clock=SystemClock(), stop=stop, rates=rates)
 
