@@ -3,45 +3,97 @@
 from __future__ import annotations
 
 import json
+from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from sim.bench.legs import leg_times, legs_flown, load_run
+from coordinator.planner.plan_report import schedule_as_json
+from sim.bench.legs import leg_times, legs_flown, load_run, makespan_frac
+from sim.world.simulation import simulate_mission
+from sim.world.uncertainty import Uncertainty
+from swarm.model import TaskId, UavId
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
 
 MEADOW = load_scenario(resolve_scenario("meadow"))
-FLOWN = {
+STARTS = {uav.id: uav.position_enu_m for uav in MEADOW.uavs}
+PLACES = {task.id: task.position_enu_m for task in MEADOW.tasks}
+
+
+def visit(go: str, from_m: tuple[float, ...], *times_s: float) -> dict[str, Any]:
+    depart_s, begin_s, end_s = times_s
+    times = {"depart_s": depart_s, "arrive_s": begin_s, "begin_s": begin_s, "end_s": end_s}
+    via_m = [list(PLACES[TaskId(go)][:2])] if go in PLACES else [[0.0, 0.0]]
+    return {"go": go, "from_m": list(from_m[:2]), "via_m": via_m, "reversed": False, **times}
+
+
+FLOWN: dict[str, Any] = {
     "scenario": "meadow",
-    "executed_routes": {"uav1": ["west-near", "west-far"], "uav2": [], "uav3": ["east-near"]},
-    "executed_completion_s": {"west-near": 15.0, "west-far": 26.0, "east-near": 12.0},
+    "executed_schedule": {
+        "uav1": [
+            visit("west-near", STARTS[UavId("uav1")], 0.0, 12.0, 15.0),
+            visit("west-far", PLACES[TaskId("west-near")], 15.0, 26.0, 29.0),
+            visit("start", PLACES[TaskId("west-far")], 29.0, 40.0, 40.0),
+        ],
+        "uav2": [],
+        "uav3": [visit("east-near", STARTS[UavId("uav3")], 1.0, 12.0, 15.0)],
+    },
+    "completion_s": {"west-near": 12.0, "west-far": 20.0, "east-near": 11.0},
+    "makespan_s": 29.0,
 }
 
 
-def test_a_leg_lasts_from_the_end_of_a_task_to_the_next_ones_service() -> None:
+def test_a_leg_lasts_from_departure_to_arrival() -> None:
     legs = legs_flown(MEADOW, FLOWN, "flight.json")
 
     assert [(leg.uav, leg.task, leg.flown_s) for leg in legs] == [
-        ("uav1", "west-near", 12.0),  # 3 s of service
+        ("uav1", "west-near", 12.0),
         ("uav1", "west-far", 11.0),
-        ("uav3", "east-near", 12.0),
+        ("uav3", "east-near", 11.0),
     ]
     assert legs[0].length_m == pytest.approx((60.0**2 + 30.0**2) ** 0.5)
     assert legs[0].excess_s == pytest.approx(12.0 - legs[0].length_m / 8.0)
+    assert legs[0].planned_s == pytest.approx(legs[0].length_m / 8.0)
 
 
-def test_the_median_is_told_with_its_spread_and_beyond_the_ramps() -> None:
+def test_medians_are_told_with_their_spread_and_beyond_the_ramps() -> None:
     legs = legs_flown(MEADOW, FLOWN, "flight.json")
     times = leg_times(legs, 2.0)
 
     excess_s = sorted(leg.excess_s for leg in legs)
+    fracs = sorted(leg.flown_s / leg.planned_s for leg in legs)
     assert times is not None
     assert (times.legs, times.least_s, times.greatest_s) == (3, excess_s[0], excess_s[2])
     assert times.median_s == excess_s[1]
+    assert (times.least_frac, times.flown_frac, times.greatest_frac) == tuple(fracs)
     assert times.beyond_ramps_s == pytest.approx(excess_s[1] - 4.0)
     assert leg_times([], 2.0) is None
+
+
+def test_the_makespan_is_set_beside_the_plans() -> None:
+    assert makespan_frac(FLOWN) == pytest.approx(29.0 / 20.0)
+    assert makespan_frac({**FLOWN, "completion_s": {}}) is None
+
+
+def test_in_virtual_time_the_fields_legs_take_what_the_model_says() -> None:
+    """Bases, zones, wind, lines and a window: legs round zones from task to task, and no others."""
+    mission = load_scenario(resolve_scenario("reservoir-inspection"))
+    flown = simulate_mission(mission, method="guided", seed=0, uncertainty=Uncertainty())
+    schedule: dict[str, Any] = schedule_as_json(flown.world.executed_schedule())
+    run = {"executed_schedule": schedule, "completion_s": {}, "makespan_s": 0.0}
+
+    legs = legs_flown(mission, run, "flight.json")
+
+    went = [(before["go"], at["go"]) for e in schedule.values() for before, at in pairwise(e)]
+    between = [(before, at) for before, at in went if at in {t.id for t in mission.tasks}]
+    from_bases = sum(":" in before for before, _ in between)
+    assert from_bases > 0
+    assert 5 <= len(legs) <= len(mission.uavs) + len(between) - from_bases
+    for leg in legs:
+        assert leg.flown_s == pytest.approx(leg.planned_s, abs=0.05)
 
 
 @pytest.mark.parametrize(
@@ -49,7 +101,7 @@ def test_the_median_is_told_with_its_spread_and_beyond_the_ramps() -> None:
     [
         ("no json", "it is not JSON"),
         ("[]", "is missing"),
-        (json.dumps({"scenario": "meadow", "executed_routes": {}}), "executed_completion_s"),
+        (json.dumps({"scenario": "meadow", "executed_routes": {}}), "executed_schedule"),
     ],
 )
 def test_what_is_no_flight_is_refused(tmp_path: Path, text: str, problem: str) -> None:
@@ -60,6 +112,6 @@ def test_what_is_no_flight_is_refused(tmp_path: Path, text: str, problem: str) -
 
 
 def test_a_flight_of_another_scenario_is_refused() -> None:
-    other = {**FLOWN, "executed_routes": {"uav1": ["nowhere"]}}
+    other = {**FLOWN, "executed_schedule": {"uav1": [visit("nowhere", (0.0, 0.0), 0.0, 1.0, 2.0)]}}
     with pytest.raises(InputError, match="'nowhere' is not in the scenario meadow"):
         legs_flown(MEADOW, other, "flight.json")
