@@ -182,20 +182,17 @@ def make_plan(
         method: one of `METHODS`, or a rule by which UAVs decide in the mission's order.
         clock: measures the elapsed time; nothing is decided by it.
         seed: of ``guided`` and of the local search, which only large fleets need.
-        stop: ends planning with the best so far; None means that a search ends after a few
-            seconds' worth of work.
+        stop: ends planning with the best so far; None: after a few seconds' worth of work.
         progress: told the evaluations or iterations and the best J so far, again and again.
-        bound_s: work out an upper bound on J for about this long where the optimum is not proven
-            [s]; not at all when None.
+        bound_s: bound J for about this long where the optimum is not proven [s]; not when None.
         bound_frac: share of a limit that is kept for that bound, within 0..1.
         threads: at most this many, of processors if None; changes nothing but speed.
         modest: search little for a sequence; costs 0.1 % of J at 10 × 50, saves most of the time.
-        rates: of UAVs of which it is known that they fly otherwise than a mission in the field
-            says.
+        rates: how UAVs fly, where that is known to be otherwise than a mission in the field says.
 
     Returns:
-        The plan; without a sequence for ``exact``, which has none. Where the limit came before the
-        end of the first evaluation, it has 0 evaluations and the last decisions are greedy.
+        The plan; ``exact`` has no sequence. Where the limit came before the end of the first
+        evaluation, it has 0 evaluations and the last decisions are greedy.
 
     Raises:
         ValueError: there is no such method.
@@ -208,8 +205,8 @@ def make_plan(
         # Here: all that the field needs would let plans of plain missions begin later.
         from coordinator.planner.field_plan import FieldRequest, make_field_plan
 
-        limits = (seed, stop, progress, bound_s, bound_frac, threads, modest)
-        return make_field_plan(FieldRequest(mission, method, clock, *limits, rates or {}))
+        asked = (seed, stop, progress, bound_s, bound_frac, threads, modest, rates or {})
+        return make_field_plan(FieldRequest(mission, method, clock, *asked))
     begin_s = clock.now_s()
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop
