@@ -10,6 +10,7 @@ import json
 from collections import Counter
 from dataclasses import dataclass
 from itertools import takewhile
+from typing import TYPE_CHECKING
 
 import swarm
 from coordinator.dashboard.baseline import Baseline, baseline_of
@@ -31,6 +32,9 @@ from swarm.protocol.operator_commands import (
     zones_in_force,
 )
 from swarm.protocol.uav_messages import Choice
+
+if TYPE_CHECKING:
+    from coordinator.mission_view.ways import UavWays
 
 PROTOCOL = 1
 _STORY, _CHOICES, _CURVE, _COMMANDS = 500, 300, 600, 200
@@ -299,12 +303,15 @@ class Feed:
         epoch = replica.epoch
         planned = {} if epoch is None else epoch.routes
         flown = {} if self._progress is None else self._progress.flown
+        ways = mission_state.ways(self._source.now_s())
         for uav in brief.uavs:
-            row = {
+            row: dict[str, object] = {
                 "uav": uav.id,
                 "planned": planned.get(uav.id, ()),
                 "flown": tuple(flown.get(uav.id, ())),
             }
+            if uav.id in ways:
+                row["ways"] = _ways_row(ways[uav.id])
             self._lists.put(uav.id, row, self.seq)
 
     def _look_at_progress(self, problem: Problem, mission_state: MissionState) -> None:
@@ -372,6 +379,12 @@ def _uav_row(state: UavState, command: str | None, speedup: float) -> dict[str, 
         "command": command,
         "dropped": dict(state.dropped),
     }
+
+
+def _ways_row(ways: UavWays) -> dict[str, object]:
+    """Points of its ways in the field [m]."""
+    paths = {"flown": ways.flown, "leg": ways.leg, "ahead": ways.ahead}
+    return {name: [[round(m, 1) for m in point] for point in path] for name, path in paths.items()}
 
 
 def _mission_text(name: str, brief: MissionConfig) -> str:

@@ -8,8 +8,9 @@ agents report (`FleetReports`), mission time (`PacedClock`), and the story (`Mis
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from coordinator.mission_view.fleet_reports import FleetReports
 from coordinator.mission_view.flown_mission import FlownMission
@@ -51,6 +52,9 @@ from swarm.protocol.sync import QuestionTimer
 from swarm.protocol.timing import StallDetector, Timing, earliest
 from swarm.protocol.uav_messages import AttemptResult, Choice, ClaimPhase, Outcome, Status
 
+if TYPE_CHECKING:
+    from coordinator.mission_view.ways import FleetWays, UavWays
+
 EPOCHS_KEPT = 16
 """Epochs that an observer tells from new ones; one is restated soon after it was stated, or not."""
 
@@ -77,6 +81,7 @@ class MissionState:
         self._timing = timing
         self.flights = ObservedFlights()
         """Where UAVs went, as far as they have told."""
+        self._ways: FleetWays | None = None
         self._flown = FlownMission(mission, self.board)
         self._reports = FleetReports(self.replica)
         self.statuses = self._reports.statuses
@@ -252,6 +257,17 @@ class MissionState:
     def story(self) -> list[MissionEvent]:
         """The newest lines; where older ones are gone, the first tells how many."""
         return self._narrator.story.lines
+
+    def ways(self, now_s: float) -> Mapping[str, UavWays]:
+        """By UAV id, the ways of a fleet in the field; none of a plain mission."""
+        if self.board.field_problem is None:
+            return {}
+        if self._ways is None:
+            # Plain missions never load it.
+            from coordinator.mission_view.ways import FleetWays
+
+            self._ways = FleetWays(self.board, self.flights)
+        return self._ways.of(self.mission, self.present, max(0.0, self.mission_s(now_s) or 0.0))
 
     @property
     def told(self) -> int:

@@ -133,6 +133,7 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
         planned_objective = None
     states = FleetStates(mission_state, now_s)
     standing = [states.of(uav.id) for uav in mission.uavs]
+    ways = mission_state.ways(now_s)
     taken = {state.task: state.id for state in reversed(standing) if state.task is not None}
     return Scene(
         mission=mission,
@@ -154,6 +155,7 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
                     if task not in over and taken.get(TaskId(task), uav.id) == uav.id
                 ),
                 start_enu_m=uav.position_enu_m,
+                ways=ways.get(str(uav.id)),
             )
             for uav, state, short in zip(mission.uavs, standing, shorts, strict=True)
         ),

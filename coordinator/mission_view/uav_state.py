@@ -7,11 +7,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from coordinator.mission_view.mission_state import MissionState
 from swarm.model import BaseId, TaskId, UavId
 from swarm.protocol.calibration import AS_BRIEFED, FlightRates, flight_rates
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, Status, StatusPhase
+
+if TYPE_CHECKING:
+    from coordinator.mission_view.ways import UavWays
 
 Point = tuple[float, float, float]
 LOST = "lost"
@@ -150,6 +154,8 @@ class UavView(UavState):
     planned: tuple[TaskId, ...]
     """Tasks its list has for it that are not over yet, nor taken by others."""
     start_enu_m: Point
+    ways: UavWays | None = None
+    """Its ways in the field; None of a plain mission, where all are straight."""
 
     @property
     def place_enu_m(self) -> Point:

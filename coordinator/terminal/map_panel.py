@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from itertools import groupby, pairwise
 from operator import itemgetter
+from typing import TYPE_CHECKING
 
 import numpy as np
 from rich.text import Text
@@ -17,6 +18,9 @@ from coordinator.mission_view.presentation import BAD, Signs, uav_colour
 from coordinator.mission_view.scene import Scene, TaskView
 from coordinator.mission_view.uav_state import UavView
 from swarm.protocol.board import TaskState
+
+if TYPE_CHECKING:
+    from coordinator.mission_view.ways import MapPath
 
 Spot = tuple[float, float]
 """Column and row [cells], counted from the middle of the top left cell."""
@@ -224,7 +228,9 @@ def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
     for task in scene.tasks:
         for first, last in pairwise(task.path_enu_m):
             canvas.line(view.spot(first), view.spot(last), "dim", every=3)
-    for uav in scene.uavs:
+    _draw_ways(canvas, view, scene, room)
+    straight = [uav for uav in scene.uavs if uav.ways is None]
+    for uav in straight:
         if room < _ROOM_FOR_PLANS or uav.troubled:
             continue
         faint = f"dim {uav_colour(uav.number)}"
@@ -233,7 +239,7 @@ def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
         stops = [begin, *(places[task] for task in ahead)]
         for first, last in pairwise(stops):
             canvas.line(view.spot(first), view.spot(last), faint, every=4)
-    for uav in scene.uavs:
+    for uav in straight:
         if room >= _ROOM_FOR_PATHS:
             stops = [uav.start_enu_m, *(places[task] for task in uav.flown if task in places)]
             if uav.busy or uav.troubled:
@@ -243,6 +249,33 @@ def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
         if uav.task is not None and uav.task in places:
             target = view.spot(places[uav.task])
             canvas.line(view.spot(uav.place_enu_m), target, uav_colour(uav.number), every=2)
+
+
+def _draw_ways(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
+    """Ways in the field: ahead and home below what was flown, and what is flown now on top."""
+    if all(uav.ways is None for uav in scene.uavs):
+        return
+    # Plain missions never load it.
+    from coordinator.mission_view.ways import still_ahead
+
+    def draw(path: MapPath, style: str, every: int) -> None:
+        for first, last in pairwise(path):
+            canvas.line(view.beyond(first), view.beyond(last), style, every=every)
+
+    for uav in scene.uavs:
+        if uav.ways is not None and room >= _ROOM_FOR_PLANS and not uav.troubled:
+            draw(uav.ways.ahead, f"dim {uav_colour(uav.number)}", 4)
+    for uav in scene.uavs:
+        if uav.ways is None:
+            continue
+        east_m, north_m, _ = uav.place_enu_m
+        left = still_ahead(uav.ways.leg, (east_m, north_m))
+        if room >= _ROOM_FOR_PATHS:
+            draw(uav.ways.flown, uav_colour(uav.number), 1)
+            begun = uav.ways.leg[: len(uav.ways.leg) + 1 - len(left)]
+            draw((*begun, (east_m, north_m)), uav_colour(uav.number), 1)
+        if uav.ways.leg and not uav.troubled:
+            draw(left, uav_colour(uav.number), 2)
 
 
 def _weight(task: TaskView) -> int:

@@ -121,13 +121,17 @@ def fleet_as_flown(fleet: Mission, rates: Mapping[str, FlightRates]) -> Mission:
 def field_as_flown(
     problem: field.FieldProblem, rates: Mapping[str, FlightRates]
 ) -> field.FieldProblem:
-    """``problem`` with the times and batteries that UAVs really have; the same one likewise."""
+    """``problem`` with the times and batteries that UAVs really have; the same one likewise.
+
+    Who has to climb has used up some charge at mission time 0, when the last one is in the air.
+    """
     known = [rates.get(uav, AS_BRIEFED) for uav in problem.uav_ids]
     return problem.calibrated(
         [each.time_frac for each in known],
         [each.drain_frac for each in known],
         [each.land_s for each in known],
         [each.climb_s for each in known],
+        aloft_s=max(each.climb_s for each in known),
     )
 
 

@@ -192,6 +192,7 @@ class FieldProblem:
         drain_frac: Sequence[float],
         land_s: Sequence[float] | None = None,
         climb_s: Sequence[float] | None = None,
+        aloft_s: float = 0.0,
     ) -> FieldProblem:
         """The same for UAVs that fly otherwise than planned; itself if none does.
 
@@ -200,6 +201,7 @@ class FieldProblem:
             drain_frac: (n_uav,) multiples of the charge that a second in the air takes; > 0.
             land_s: (n_uav,) of every leg to a base or a start, its landing [s]; when None, 0.
             climb_s: (n_uav,) of every leg from a base, what comes before it [s]; when None, 0.
+            aloft_s: for how long UAVs have been in the air at mission time 0 [s].
         """
         upright_s = (*(land_s or ()), *(climb_s or ()))
         if all(frac == 1.0 for frac in (*time_frac, *drain_frac)) and not any(upright_s):
@@ -212,7 +214,7 @@ class FieldProblem:
             leg_s=network.leg_s,
             line_s=network.line_s,
             home_s=network.home_s,
-            first_s=self.first_s / drain,
+            first_s=self.first_s / drain - aloft_s,
             full_s=self.full_s / drain,
             network=network,
         )

@@ -155,7 +155,7 @@ function paintGrid(canvas, view, look) {
 }
 
 function paintLists(canvas, view, picture, motion, look) {
-  for (const [id, { planned, flown }] of picture.lists) {
+  for (const [id, { planned, flown, ways }] of picture.lists) {
     if (!look.showsList(id)) continue;
     const strong = look.selected === id;
     const described = picture.described(id);
@@ -163,9 +163,18 @@ function paintLists(canvas, view, picture, motion, look) {
     const visited = flown.map((task) => picture.tasks.get(task)?.position).filter(Boolean);
     canvas.globalAlpha = strong ? 0.9 : 0.5;
     canvas.lineWidth = strong ? 2.5 : 1.5;
-    if (visited.length && described.start) path(canvas, view, [described.start, ...visited]);
+    if (ways) paintFlown(canvas, view, ways, motion.shown.get(id)?.told);
+    else if (visited.length && described.start) path(canvas, view, [described.start, ...visited]);
     const uav = picture.uavs.get(id);
-    if (uav?.lost || uav?.claim === "out") continue;
+    if (uav?.lost || (uav?.claim === "out" && !ways)) continue;
+    if (ways) {
+      canvas.globalAlpha = strong ? 0.95 : 0.6;
+      canvas.lineWidth = strong ? 1.75 : 1;
+      canvas.setLineDash(strong ? [6, 5] : [3, 5]);
+      path(canvas, view, ways.ahead);
+      canvas.setLineDash([]);
+      continue;
+    }
     const ahead = planned
       .map((task) => picture.tasks.get(task))
       .filter((task) => task && task.state === "open" && task.id !== uav?.task);
@@ -178,6 +187,28 @@ function paintLists(canvas, view, picture, motion, look) {
     canvas.setLineDash([]);
   }
   canvas.globalAlpha = 1;
+}
+
+/** The ways flown in the field, and of the one that is being flown what lies behind `place`. */
+function paintFlown(canvas, view, { flown, leg }, place) {
+  path(canvas, view, flown);
+  if (place && leg.length) path(canvas, view, [...leg.slice(0, 1 + lastPassed(leg, place)), place]);
+}
+
+/** Index of the corner of a way behind which `place` lies: of the nearest piece, its beginning. */
+export function lastPassed(way, place) {
+  let [best, found] = [Infinity, 0];
+  for (let index = 0; index + 1 < way.length; index += 1) {
+    const [[east, north], [toEast, toNorth]] = [way[index], way[index + 1]];
+    const along = [toEast - east, toNorth - north];
+    const beyond = [place[0] - east, place[1] - north];
+    const square = along[0] ** 2 + along[1] ** 2;
+    const share = square ? (along[0] * beyond[0] + along[1] * beyond[1]) / square : 0;
+    const held = Math.min(1, Math.max(0, share));
+    const away = Math.hypot(beyond[0] - held * along[0], beyond[1] - held * along[1]);
+    if (away < best) [best, found] = [away, index];
+  }
+  return found;
 }
 
 function paintTrails(canvas, view, picture, motion, look) {
@@ -298,10 +329,12 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
     const spot = view.spot(at);
     if (!row || !view.holds(spot, 400)) continue;
     spots.set(id, spot);
-    const target = row.task && !row.lost ? picture.tasks.get(row.task) : null;
-    if (!target) continue;
     canvas.strokeStyle = uavColour(picture.described(id).number, look.ink.dark);
     canvas.lineWidth = look.selected === id ? 2 : 1.25;
+    const leg = picture.lists.get(id)?.ways?.leg;
+    if (leg?.length && !row.lost) path(canvas, view, [at, ...leg.slice(1 + lastPassed(leg, at))]);
+    const target = row.task && !row.lost && !leg ? picture.tasks.get(row.task) : null;
+    if (!target) continue;
     const [x, y] = view.spot(target.position);
     line(canvas, spot[0], spot[1], x, y);
   }

@@ -105,6 +105,9 @@ def test_legs_that_end_or_begin_on_the_ground_take_longer_by_landing_and_climbin
     here = after.legs_from_s(1, (3.0, 4.0, 0.0)) - 1.25 * before.legs_from_s(1, (3.0, 4.0, 0.0))
     np.testing.assert_allclose(here, [20.0, 20.0, 20.0, 0.0, 0.0], atol=1e-9)
     assert after.land_s(1, base) == 20.0
+    # All are in the air, and wait there, while the last one climbs.
+    np.testing.assert_array_equal(after.first_s, before.first_s - 7.0)
+    np.testing.assert_array_equal(after.full_s, before.full_s)
     assert after.land_s(1, near) == after.land_s(0, base) == 0.0
     way = way_to(after, 1, (3.0, 4.0, 0.0), base)
     assert way is not None
