@@ -267,7 +267,7 @@ class MissionState:
             from coordinator.mission_view.ways import FleetWays
 
             self._ways = FleetWays(self.board, self.flights)
-        return self._ways.of(self.mission, self.present, max(0.0, self.mission_s(now_s) or 0.0))
+        return self._ways.of(self.present, max(0.0, self.mission_s(now_s) or 0.0))
 
     @property
     def told(self) -> int:

@@ -1,9 +1,9 @@
 """The ways of a fleet in the field, as pictures draw them: flown, being flown, and still ahead.
 
 Round zones, along lines, by way of bases and home, as decisions reckon with them. What was flown
-is known by outcomes and landings. Ahead are the lists of the epoch in force as they could be flown
-from here: where batteries are changed follows from them. Plain missions have none of this: their
-ways are straight, and begin and end at tasks.
+is known by outcomes and landings. Ahead is what a decision made now would have the fleet do: the
+lists of the epoch in force, searched anew, with changes of batteries where they need them. Plain
+missions have none of this: their ways are straight, and begin and end at tasks.
 """
 
 from __future__ import annotations
@@ -30,6 +30,10 @@ MapPoint = tuple[float, float]
 MapPath = tuple[MapPoint, ...]
 
 
+_ITERATIONS = 200
+"""Of the search from the epoch's lists: about what a decision spends."""
+
+
 @dataclass(frozen=True, slots=True)
 class UavWays:
     """Of one UAV; each begins where the one before ends, and has no points where there is none."""
@@ -52,18 +56,16 @@ class FleetWays:
         self._basis: tuple[object, ...] = ()
         self._ways: Mapping[str, UavWays] = {}
 
-    def of(
-        self, mission: Mission, present: Collection[str], mission_s: float
-    ) -> Mapping[str, UavWays]:
+    def of(self, present: Collection[str], mission_s: float) -> Mapping[str, UavWays]:
         """By UAV id; none where the mission is plain.
 
         Args:
-            mission: that is flown, with the operator's tasks.
             present: UAVs believed alive.
             mission_s: now [s mission time].
         """
         problem, replica = self._board.field_problem, self._board.replica
-        if problem is None:
+        mission = self._board.mission
+        if problem is None or mission is None:
             return {}
         claims = tuple(replica.claims.items())
         basis = replica.epoch, claims, replica.task_version, frozenset(present)
@@ -105,7 +107,9 @@ class FleetWays:
             state.active[row] &= uav in claims and claims[uav].phase is not ClaimPhase.OUT
             state.free_s[row] = max(state.free_s[row], mission_s)
         begin = item_lists(problem, epoch.routes)
-        found = optimise_lists(problem.kernel, state, iterations=0, lists=begin, threads=1)
+        found = optimise_lists(
+            problem.kernel, state, iterations=_ITERATIONS, lists=begin, threads=1
+        )
         home = fly_lists(problem.kernel, state, found.lists).home.tolist()
         return [
             (found.lists[row], home[row]) if state.active[row] else None
