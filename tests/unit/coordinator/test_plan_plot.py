@@ -139,7 +139,7 @@ def test_map_of_the_field_shows_zones_bases_lines_ways_home_and_what_is_left_out
     figure = plan_figure(mission, plan)
 
     found = texts(figure)
-    for name in ("village", "bird-island", "dam-yard", "boathouse", "ferry-pier\n180-300 s"):
+    for name in ("village", "bird-island", "dam-yard", "boathouse", "ferry-pier\n285-375 s"):
         assert name in found
     for meaning in ("way home", "line to fly along", "base: batteries are swapped"):
         assert meaning in found
