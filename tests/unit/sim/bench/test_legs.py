@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from coordinator.planner.plan_report import schedule_as_json
-from sim.bench.legs import leg_times, legs_flown, load_run, makespan_frac
+from sim.bench.flown_legs import leg_times, legs_flown, load_run, makespan_frac
 from sim.world.simulation import simulate_mission
 from sim.world.uncertainty import Uncertainty
 from swarm.model import TaskId, UavId

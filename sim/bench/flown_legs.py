@@ -1,0 +1,185 @@
+"""How long vehicles take for legs and missions, beside what plans reckon with.
+
+Leaves out: how that is asked for and told (sim.bench.legs).
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import statistics
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+from swarm.allocation import field
+from swarm.model import Mission, Task, TaskId, UavId
+from swarm.protocol.fields import Point
+from swarm.runtime.errors import Fault, InputError
+
+_REMEDY = "name what swarm run SCENARIO --json printed of a flight of that scenario"
+_WAITED_S = 0.5
+"""After a window has opened: who began that soon may have waited for it."""
+
+
+@dataclass(frozen=True, slots=True)
+class FlownLeg:
+    """One leg in the air, from rest to rest."""
+
+    uav: str
+    task: str
+    length_m: float
+    """Round zones, if need be."""
+    speed_m_s: float
+    """Cruise speed that the UAV was told."""
+    planned_s: float
+    """By the kinematic model: acceleration, wind and zones, as the scenario has them."""
+    flown_s: float
+
+    @property
+    def excess_s(self) -> float:
+        """Beyond length ÷ speed."""
+        return self.flown_s - self.length_m / self.speed_m_s
+
+    @property
+    def flown_frac(self) -> float:
+        """Flown over planned; 1 of a leg of no length."""
+        return self.flown_s / self.planned_s if self.planned_s > 0.0 else 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class LegTimes:
+    """What legs took beside what they should."""
+
+    legs: int
+    flown_frac: float
+    """Median of flown over planned."""
+    least_frac: float
+    greatest_frac: float
+    median_s: float
+    """Of what they took beyond length ÷ speed, as the next two [s]."""
+    least_s: float
+    greatest_s: float
+    beyond_ramps_s: float | None
+    """Median of what they took beyond length ÷ speed + speed ÷ acceleration; None where no
+    acceleration is known."""
+
+
+def load_run(path: Path) -> Mapping[str, Any]:
+    """What `swarm run --json` printed.
+
+    Raises:
+        InputError: it cannot be read, or is something else.
+    """
+    try:
+        told = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as fault:
+        raise InputError(Fault(str(path), "", fault.strerror or str(fault), _REMEDY)) from fault
+    except ValueError as fault:
+        raise InputError(Fault(str(path), "", "it is not JSON", _REMEDY)) from fault
+    keys = ("scenario", "executed_schedule", "completion_s", "makespan_s")
+    lacks = [key for key in keys if not isinstance(told, dict) or key not in told]
+    if lacks:
+        raise InputError(Fault(str(path), lacks[0], "is missing", _REMEDY))
+    found: Mapping[str, Any] = told
+    return found
+
+
+def legs_flown(mission: Mission, run: Mapping[str, Any], source: str) -> list[FlownLeg]:
+    """Legs to tasks of one flight, of which `swarm run --json` said ``run``.
+
+    Those from a base, which begin with a take-off, and those that end in waiting for a window are
+    left out.
+
+    Args:
+        mission: the scenario.
+        run: what was said.
+        source: where that stands, for people.
+
+    Raises:
+        InputError: it flew another scenario.
+    """
+    schedule = run["executed_schedule"]
+    known = {uav.id for uav in mission.uavs}
+    tasks = {task.id: task for task in mission.tasks}
+    strangers = [uav for uav in schedule if uav not in known]
+    strangers += [
+        entry["go"]
+        for entries in schedule.values()
+        for entry in entries
+        if entry["go"] not in tasks and entry["go"] != "start" and ":" not in entry["go"]
+    ]
+    if strangers:
+        problem = f"{strangers[0]!r} is not in the scenario {mission.name}"
+        raise InputError(Fault(source, "executed_schedule", problem, _REMEDY))
+    reckoned = field.FieldProblem.from_mission(mission)
+    return [
+        leg
+        for uav, entries in schedule.items()
+        for leg in _legs_of(mission, reckoned, uav, entries)
+    ]
+
+
+def _legs_of(
+    mission: Mission, problem: field.FieldProblem, uav: str, entries: Sequence[Mapping[str, Any]]
+) -> Iterator[FlownLeg]:
+    row = problem.uav_ids.index(UavId(uav))
+    tasks = {task.id: task for task in mission.tasks}
+    here_enu_m = mission.uavs[row].position_enu_m
+    took_off = False
+    for entry in entries:
+        task = tasks.get(TaskId(entry["go"]))
+        if task is None:
+            took_off = True
+            continue
+        backwards = bool(entry["reversed"])
+        nodes = field.task_nodes(problem, problem.task_ids.index(task.id), backwards=backwards)
+        waited = task.opens_s > 0.0 and entry["begin_s"] <= task.opens_s + _WAITED_S
+        if not took_off and not waited:
+            from_enu_m = *entry["from_m"], here_enu_m[2]
+            across_m = sum(math.dist(*both) for both in pairwise([from_enu_m[:2], *entry["via_m"]]))
+            up_m = _ends_of(task, backwards=backwards)[0][2] - here_enu_m[2]
+            yield FlownLeg(
+                uav,
+                task.id,
+                math.hypot(across_m, up_m),
+                mission.uavs[row].speed_m_s,
+                float(problem.legs_from_s(row, from_enu_m)[nodes[0]]),
+                entry["arrive_s"] - entry["depart_s"],
+            )
+        here_enu_m, took_off = _ends_of(task, backwards=backwards)[-1], False
+
+
+def _ends_of(task: Task, *, backwards: bool) -> tuple[Point, ...]:
+    """Where it is flown along, in that direction."""
+    return (task.path_enu_m or (task.position_enu_m,))[:: -1 if backwards else 1]
+
+
+def makespan_frac(run: Mapping[str, Any]) -> float | None:
+    """Flown makespan over that of the plan; None where there was no plan."""
+    planned_s = max(run["completion_s"].values(), default=0.0)
+    return float(run["makespan_s"] / planned_s) if planned_s > 0.0 else None
+
+
+def leg_times(legs: Sequence[FlownLeg], acceleration_m_s2: float | None) -> LegTimes | None:
+    """Medians and spread; None without any leg. The acceleration is None if it is not known."""
+    if not legs:
+        return None
+    excess_s = sorted(leg.excess_s for leg in legs)
+    fracs = sorted(leg.flown_frac for leg in legs)
+    beyond_s = None
+    if acceleration_m_s2 is not None:
+        ramps_s = (leg.excess_s - leg.speed_m_s / acceleration_m_s2 for leg in legs)
+        beyond_s = statistics.median(ramps_s)
+    return LegTimes(
+        legs=len(legs),
+        flown_frac=statistics.median(fracs),
+        least_frac=fracs[0],
+        greatest_frac=fracs[-1],
+        median_s=statistics.median(excess_s),
+        least_s=excess_s[0],
+        greatest_s=excess_s[-1],
+        beyond_ramps_s=beyond_s,
+    )
