@@ -25,6 +25,8 @@ share: model, scenarios, allocation, protocol, bus, identity, runtime.
 
 from __future__ import annotations
 
+from swarm.lazy_names import names_from
+
 TYPE_CHECKING = False  # as typing has it, which everybody would have to import for it
 if TYPE_CHECKING:
     from swarm.allocation.own_rule import Turn
@@ -53,26 +55,16 @@ __all__ = [
     "simulate",
 ]
 
-_WHERE = {
-    "swarm.allocation.own_rule": ("Turn",),
-    "swarm.interface": ("Flight", "evaluate", "load", "plan", "read_recording", "simulate"),
-    "swarm.model": ("Evaluation", "Mission", "Plan", "Task", "TaskId", "Uav", "UavId"),
-    "swarm.runtime.errors": ("SwarmError",),
-}
-
-
 if not TYPE_CHECKING:  # a type checker must know no other name
-
-    def __getattr__(name: str) -> object:
-        """Import what is asked for, once."""
-        from importlib import import_module
-
-        for module, names in _WHERE.items():
-            if name in names:
-                found: object = getattr(import_module(module), name)
-                globals()[name] = found
-                return found
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = names_from(
+        __name__,
+        {
+            "swarm.allocation.own_rule": ("Turn",),
+            "swarm.interface": ("Flight", "evaluate", "load", "plan", "read_recording", "simulate"),
+            "swarm.model": ("Evaluation", "Mission", "Plan", "Task", "TaskId", "Uav", "UavId"),
+            "swarm.runtime.errors": ("SwarmError",),
+        },
+    )
 
 
 def __dir__() -> list[str]:

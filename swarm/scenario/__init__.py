@@ -5,6 +5,8 @@ Everything is imported when it is first used: a process that only names scenario
 
 from __future__ import annotations
 
+from swarm.lazy_names import names_from
+
 TYPE_CHECKING = False  # as typing has it, which everybody would have to import for it
 if TYPE_CHECKING:
     from swarm.scenario.files import resolve_scenario, shipped_scenarios
@@ -21,23 +23,13 @@ __all__ = [
     "shipped_scenarios",
 ]
 
-_WHERE = {
-    "swarm.scenario.files": ("resolve_scenario", "shipped_scenarios"),
-    "swarm.scenario.plain": ("require_plain",),
-    "swarm.scenario.read": ("load_scenario", "parse_scenario"),
-    "swarm.scenario.write": ("format_scenario",),
-}
-
-
 if not TYPE_CHECKING:  # a type checker must know no other name
-
-    def __getattr__(name: str) -> object:
-        """Import what is asked for, once."""
-        from importlib import import_module
-
-        for module, names in _WHERE.items():
-            if name in names:
-                found: object = getattr(import_module(module), name)
-                globals()[name] = found
-                return found
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = names_from(
+        __name__,
+        {
+            "swarm.scenario.files": ("resolve_scenario", "shipped_scenarios"),
+            "swarm.scenario.plain": ("require_plain",),
+            "swarm.scenario.read": ("load_scenario", "parse_scenario"),
+            "swarm.scenario.write": ("format_scenario",),
+        },
+    )

@@ -6,6 +6,8 @@ says ``field.FieldProblem``, and loads nothing of it for plain missions.
 
 from __future__ import annotations
 
+from swarm.lazy_names import names_from
+
 TYPE_CHECKING = False  # as typing has it
 if TYPE_CHECKING:
     from swarm.allocation.field.problem import FieldProblem
@@ -24,23 +26,13 @@ __all__ = [
     "way_to",
 ]
 
-_WHERE = {
-    "swarm.allocation.field.problem": ("FieldProblem",),
-    "swarm.allocation.field.recent": ("problem_of",),
-    "swarm.allocation.field.state": ("FieldState",),
-    "swarm.allocation.field.ways": ("Way", "base_node", "task_nodes", "way_home", "way_to"),
-}
-
-
 if not TYPE_CHECKING:  # a type checker must know no other name
-
-    def __getattr__(name: str) -> object:
-        """Import what is asked for, once."""
-        from importlib import import_module
-
-        for module, names in _WHERE.items():
-            if name in names:
-                found: object = getattr(import_module(module), name)
-                globals()[name] = found
-                return found
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    __getattr__ = names_from(
+        __name__,
+        {
+            "swarm.allocation.field.problem": ("FieldProblem",),
+            "swarm.allocation.field.recent": ("problem_of",),
+            "swarm.allocation.field.state": ("FieldState",),
+            "swarm.allocation.field.ways": ("Way", "base_node", "task_nodes", "way_home", "way_to"),
+        },
+    )
