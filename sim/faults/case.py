@@ -20,11 +20,10 @@ from sim.faults.message_log import Violation
 from sim.faults.planted_bugs import BUGS
 from sim.faults.schedule import Disturbance, DisturbanceKind, format_schedule, parse_schedule
 from sim.world.engine import EventQueue, LocalClock, stream
-from sim.world.field_vehicle import vehicles_of
 from sim.world.motion import flown_s
 from sim.world.network import NetworkConditions, Topology
 from sim.world.rough_network import RoughNetwork
-from sim.world.settings import Planner, WorldSettings
+from sim.world.settings import Planner, WorldSettings, vehicles_of
 from sim.world.virtual_world import ONLOOKER, OPERATOR_PATIENCE_S, STANDBY, World
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId

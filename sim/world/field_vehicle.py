@@ -33,12 +33,10 @@ from sim.world.engine import EventQueue
 from sim.world.field_paths import FieldPaths
 from sim.world.flown_path import FlownPath
 from sim.world.motion import Point, between, minus, plus
-from sim.world.settings import ideal_vehicle
-from sim.world.track import Track, drifting
+from sim.world.track import drifting
 from sim.world.uncertainty import Realization
-from sim.world.vehicles import SimulatedVehicle, VehicleFactory
+from sim.world.vehicles import SimulatedVehicle, TracedVehicle, VehicleFactory
 from swarm.model import Mission
-from swarm.model.mission import PLAIN_CONSTRAINTS
 
 _AT_REST: Point = (0.0, 0.0, 0.0)
 _ABOVE_M = 0.5
@@ -48,7 +46,7 @@ _TOLERANCE_S = 1e-6
 """Limits are inclusive: who lands at the very instant at which its battery is empty has landed."""
 
 
-class FieldVehicle:
+class FieldVehicle(TracedVehicle):
     """One vehicle, airborne ``takeoff_s`` after it is told to.
 
     Args:
@@ -69,12 +67,7 @@ class FieldVehicle:
         takeoff_s: float = 0.0,
         fate: Realization | None = None,
     ) -> None:
-        self.speed_frac = 1.0
-        """Share of its speed at which it flies from its next order on."""
-        self.track = Track()
-        """Where it truly was."""
-        self.when_empty: Callable[[], None] = lambda: None
-        """Is called when it falls out of the sky."""
+        super().__init__()
         self._queue, self._report, self._paths = queue, report, paths
         self._uav = paths.uav(uav)
         self._takeoff_s = takeoff_s
@@ -347,12 +340,10 @@ class FieldVehicle:
         self._queue.at(time_s, act)
 
 
-def vehicles_of(
+def field_vehicles(
     mission: Mission, takeoff_s: float = 0.0, fate: Realization | None = None
 ) -> VehicleFactory:
-    """Ideal vehicles of the UAVs of ``mission``, or those of a realization in the field."""
-    if PLAIN_CONSTRAINTS.issuperset(mission.constraints):
-        return ideal_vehicle
+    """Vehicles of the UAVs of a ``mission`` in the field; ideal ones without a realization."""
     paths = FieldPaths(mission)
 
     def make(

@@ -14,8 +14,10 @@ from coordinator.mission_view.mission_state import MissionState
 from coordinator.planner.online import ReplanResult, replan
 from sim.world.engine import EventQueue, LocalClock, Process
 from sim.world.network import Network
+from sim.world.uncertainty import Realization
 from sim.world.vehicles import IdealVehicle, SimulatedVehicle, VehicleFactory
 from swarm.model import Mission, Plan, UavId
+from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
 from swarm.protocol.messages import Message
 from swarm.protocol.timing import Timing
@@ -44,6 +46,17 @@ def ideal_vehicle(
     """One that flies ideally, whoever it belongs to."""
     del uav
     return IdealVehicle(queue, report)
+
+
+def vehicles_of(
+    mission: Mission, takeoff_s: float = 0.0, fate: Realization | None = None
+) -> VehicleFactory:
+    """Ideal vehicles of the UAVs of ``mission``, or those of a realization in the field."""
+    if PLAIN_CONSTRAINTS.issuperset(mission.constraints):
+        return ideal_vehicle
+    from sim.world.field_vehicle import field_vehicles  # plain missions never load it
+
+    return field_vehicles(mission, takeoff_s, fate)
 
 
 class RestartMemory(StrEnum):

@@ -20,13 +20,12 @@ from agent.core.interface import GoTo, VehicleReport
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.operator.readiness import ReadyRequest
 from sim.world.engine import EventQueue, Process
-from sim.world.field_vehicle import vehicles_of
 from sim.world.motion import flown_s
 from sim.world.network import IdealNetwork, Network, NetworkConditions, Topology
 from sim.world.outcome import Tally
 from sim.world.rough_network import RoughNetwork
 from sim.world.scripted_operator import ScriptedOperator
-from sim.world.settings import QUIET, Planner, WorldSettings
+from sim.world.settings import QUIET, Planner, WorldSettings, vehicles_of
 from sim.world.uncertainty import FleetPartition, Realization, Uncertainty
 from sim.world.vehicles import (
     IdealVehicle,

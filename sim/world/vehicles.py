@@ -55,7 +55,25 @@ VehicleFactory = Callable[[EventQueue, str, Callable[[VehicleReport], None]], Si
 """Makes the vehicle of a UAV in a queue's time; it says what it has to say by the callback."""
 
 
-class IdealVehicle:
+class TracedVehicle:
+    """What all vehicles have that move in the world itself, not behind a bridge."""
+
+    def __init__(self) -> None:
+        self.speed_frac = 1.0
+        """Share of its speed at which it flies from its next order on."""
+        self.track = Track()
+        """Where it truly was."""
+        self.when_empty: Callable[[], None] = lambda: None
+        """Is called when it falls out of the sky with an empty battery."""
+
+    def begin_mission(self) -> None:
+        """Mission time begins, which batteries are planned by."""
+
+    def drain_by(self, drain: float) -> None:
+        """Let its battery, if it has one, drain so much faster than planned from now on."""
+
+
+class IdealVehicle(TracedVehicle):
     """One ideal vehicle, airborne ``takeoff_s`` after it is told to.
 
     ``report`` is called with everything the vehicle says, at the time it says it.
@@ -64,10 +82,7 @@ class IdealVehicle:
     def __init__(
         self, queue: EventQueue, report: Callable[[VehicleReport], None], takeoff_s: float = 0.0
     ) -> None:
-        self.speed_frac = 1.0
-        """Share of the ordered speed at which it flies from its next order on."""
-        self.track = Track()
-        """Where it truly was."""
+        super().__init__()
         self._queue = queue
         self._report = report
         self._takeoff_s = takeoff_s

@@ -40,7 +40,6 @@ from coordinator.operator.commands import CommandRequest
 from coordinator.operator.requests import OperatorClient, OperatorRequest
 from sim.world.closest_approach import closest_approach
 from sim.world.engine import EventQueue, LocalClock, Process
-from sim.world.field_vehicle import FieldVehicle
 from sim.world.flight_log import FlightLog, LastSeen
 from sim.world.network import IdealNetwork
 from sim.world.settings import (
@@ -52,7 +51,7 @@ from sim.world.settings import (
     WorldSettings,
 )
 from sim.world.track import Track
-from sim.world.vehicles import IdealVehicle, SimulatedVehicle
+from sim.world.vehicles import SimulatedVehicle, TracedVehicle
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.model.layers import FlightLayers
@@ -206,15 +205,15 @@ class World:
         return True
 
     def slow(self, uav: str, speed_frac: float) -> None:
-        """Let an ideal vehicle fly at that share of its speed, from its next order on."""
+        """Let a simulated vehicle fly at that share of its speed, from its next order on."""
         vehicle = self._vehicles.get(uav)
-        if isinstance(vehicle, IdealVehicle | FieldVehicle):
+        if isinstance(vehicle, TracedVehicle):
             vehicle.speed_frac = speed_frac
 
     def drain(self, uav: str, drain: float) -> None:
         """Let the battery of a simulated vehicle drain so much faster than planned."""
         vehicle = self._vehicles.get(uav)
-        if isinstance(vehicle, FieldVehicle):
+        if isinstance(vehicle, TracedVehicle):
             vehicle.drain_by(drain)
 
     def withdraw(self, task: str) -> None:
@@ -318,7 +317,7 @@ class World:
         if running and self.zero_s is None:
             self.zero_s = self.queue.now_s()
             for vehicle in self._vehicles.values():
-                if isinstance(vehicle, FieldVehicle):
+                if isinstance(vehicle, TracedVehicle):
                     vehicle.begin_mission()
             self._schedule_faults(self.zero_s)
         if isinstance(message.body, Claim) and message.body.stage is BaseStage.PARKED:
@@ -351,9 +350,8 @@ class World:
                 commander.step(news)
 
         vehicle = self._setting.vehicle(self.queue, uav, report)
-        if isinstance(vehicle, IdealVehicle | FieldVehicle):
+        if isinstance(vehicle, TracedVehicle):
             self.tracks[uav] = vehicle.track
-        if isinstance(vehicle, FieldVehicle):
             vehicle.when_empty = partial(self._fall, uav)
         return vehicle
 
