@@ -18,7 +18,6 @@ from swarm.model.layers import FlightLayers
 from swarm.protocol.board import TaskBoard, TaskState, doable, is_of_field, mission_of
 from swarm.protocol.calibration import FlightRates, flight_rates, noticeably_otherwise
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
-from swarm.protocol.field_board import doable_in_field
 from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import MissionConfig, MissionPhase, PlanEpoch
@@ -391,6 +390,8 @@ class MissionEndCondition:
         field = self._board.field_problem
         if field is None:
             return bool(doable(self._board, present))
+        from swarm.protocol.field_board import doable_in_field  # plain missions never load it
+
         return bool(present) and bool(doable_in_field(field, self._board, present, mission_s))
 
     def _outlook(self, mission_s: float, *, more_to_come: bool) -> tuple[str | None, float]:

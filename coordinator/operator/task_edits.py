@@ -22,7 +22,6 @@ from swarm.model.frames import enu_from_wgs84
 from swarm.model.ids import ID_RULE, valid_id
 from swarm.protocol.board import TaskState
 from swarm.protocol.encoding import FIELD_DEFAULTS
-from swarm.protocol.field_board import doable_in_field
 from swarm.protocol.fields import MAX_COUNT, Point
 from swarm.protocol.messages import Message, MissionConfig, TaskEdit, TaskEntry
 from swarm.protocol.timing import Timing
@@ -374,6 +373,8 @@ class TaskEditHandler(RequestHandler[NewTask | TaskWithdrawal, TaskEdit]):
         board = self._mission_state.board
         field = board.field_problem
         if field is not None and mission_s is not None:
+            from swarm.protocol.field_board import doable_in_field  # plain missions never load it
+
             return self.task in doable_in_field(field, board, uavs, mission_s)
         problem = board.problem
         if problem is None:

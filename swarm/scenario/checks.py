@@ -11,7 +11,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from swarm.model.ids import RESERVED
 from swarm.scenario.edition import edition_of
 from swarm.scenario.findings import Document, Finding, close_match, number_of, shown
-from swarm.scenario.keep_out import field_faults
 from swarm.scenario.places import Entry, entries, misplaced
 
 _HINTS = 20
@@ -23,8 +22,13 @@ def check(document: Document) -> list[Finding]:
     uavs = list(entries(document, "uav"))
     tasks = list(entries(document, "task"))
     bases = list(entries(document, "base"))
-    # Of the second edition a task that nobody can do is left out, which a plan tells.
-    refused = _impossible_tasks(document, uavs, tasks) if edition_of(document) == 1 else ()
+    of_edition: Iterable[Finding]
+    if edition_of(document) == 1:
+        of_edition = _impossible_tasks(document, uavs, tasks)
+    else:  # where a task that nobody can do is left out, which a plan tells
+        from swarm.scenario.keep_out import field_faults  # plain missions never load it
+
+        of_edition = field_faults(document)
     return [
         *_doubled_ids("uav", uavs),
         *_doubled_ids("task", tasks),
@@ -34,10 +38,9 @@ def check(document: Document) -> list[Finding]:
         *misplaced(document, "uav", uavs),
         *misplaced(document, "task", tasks),
         *misplaced(document, "base", bases),
-        *field_faults(document),
         # Without an array of tasks every reference is unknown; that says nothing new.
         *(_unknown_references(uavs, tasks) if isinstance(document.get("task"), list) else ()),
-        *refused,
+        *of_edition,
     ]
 
 
