@@ -49,6 +49,11 @@ _PX4_DRAG_N_PER_M_S: Final = 0.3
 takes a tilt of 39° at 8 m/s, where a real one takes 10° to 15°: it creeps up to its speed for 15 s
 and overshoots its targets, and every leg takes 7 s longer."""
 
+_PX4_BATTERY_S: Final = 86_400
+"""For how long its simulator's battery lasts [s], the most that it takes. Its own 60 s would be
+half empty soon after every take-off, and agents that fly a mission with batteries change them for
+that again and again."""
+
 _HEADING_DEG: Final = 0.0
 
 
@@ -179,6 +184,7 @@ class SitlFirmware:
             "PX4_HOME_LON": f"{lon_deg:.7f}",
             "PX4_HOME_ALT": f"{alt_m:.2f}",
             "PX4_PARAM_SIH_KDV": f"{_PX4_DRAG_N_PER_M_S:g}",
+            "PX4_PARAM_SIM_BAT_DRAIN": str(_PX4_BATTERY_S),
         }
         command = (str(self.program), "-i", str(number), "-d", "-s", startup, str(etc))
         url = f"udpin:127.0.0.1:{_PX4_PORT + number}"

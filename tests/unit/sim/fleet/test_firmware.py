@@ -96,6 +96,7 @@ def test_px4_learns_everything_else_from_its_environment() -> None:
         "PX4_SIMULATOR": "sihsim",
         "PX4_SIM_SPEED_FACTOR": "2.5",
         "PX4_PARAM_SIH_KDV": "0.3",
+        "PX4_PARAM_SIM_BAT_DRAIN": "86400",
     }
 
 
