@@ -13,6 +13,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
+from coordinator.mission_view.flown_ways import MapPoint
 from coordinator.mission_view.observed_flights import ObservedFlights
 from swarm.allocation import field
 from swarm.allocation.field.rules import item_lists
@@ -25,8 +26,6 @@ from swarm.protocol.board import TaskBoard, holders
 from swarm.protocol.field_board import field_state
 from swarm.protocol.uav_messages import Claim, ClaimPhase
 
-MapPoint = tuple[float, float]
-"""East and north [m; mission origin]."""
 MapPath = tuple[MapPoint, ...]
 
 

@@ -11,13 +11,16 @@ from rich.console import Console
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.presentation import UNICODE
 from coordinator.mission_view.scene import scene_of
+from coordinator.mission_view.ways import still_ahead
 from coordinator.terminal.live_view import live_picture
 from coordinator.terminal.status_table import status_as_json, status_table
 from swarm.model import Base, BaseId, Mission, TaskId, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.model.plan import LeftOut, Plan
 from swarm.protocol.field_messages import ZoneEdit, ZoneSpec
+from swarm.protocol.messages import MissionPhase, PlanEpoch
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, StatusPhase
+from tests.support import field_registers
 from tests.support.builders import brief_of, entries_of, mission, task, uav
 from tests.support.observed_mission import Teller
 
@@ -68,6 +71,32 @@ def test_zones_and_bases_are_on_the_map_and_in_the_status(teller: Teller) -> Non
     assert any("⢸" in line or "⡇" in line for line in text.splitlines())  # the pond's border
     assert "bases        barn (1 slot)" in text
     assert "zones        pond" in text
+
+
+def test_ways_lead_round_zones_by_bases_and_home(teller: Teller) -> None:
+    teller.say(COORDINATOR, field_registers.brief_of(pasture()))
+    lists = {"u0": ("t1", "t0"), "u1": ()}
+    epoch = PlanEpoch(2, MissionPhase.RUNNING, "guided", ("u0", "u1"), 0.0, "", lists)
+    teller.say(COORDINATOR, epoch)
+    teller.say("u0", Claim(ClaimPhase.HELD, "t1", 0.0, 0, 14.0))
+
+    view = scene_of(teller.mission_state, 1.0).uavs[0]
+
+    assert view.ways is not None
+    assert view.ways.flown == ()
+    assert view.ways.leg[0] == (0.0, 0.0)
+    assert view.ways.leg[-1] == view.ways.ahead[0] == (100.0, 80.0)
+    assert set(view.ways.leg[1:-1]) <= set(POND.polygon_enu_m)
+    assert len(view.ways.leg) > 2, "not through the pond"
+    assert view.ways.ahead[-1] in (BARN.position_enu_m[:2], (0.0, 0.0))
+
+
+def test_of_a_leg_only_what_is_still_ahead_is_left() -> None:
+    leg = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0))
+
+    assert still_ahead(leg, (4.0, 1.0)) == ((4.0, 1.0), (10.0, 0.0), (10.0, 10.0))
+    assert still_ahead(leg, (10.0, 4.0)) == ((10.0, 4.0), (10.0, 10.0))
+    assert still_ahead((), (1.0, 2.0)) == ((1.0, 2.0),)
 
 
 @pytest.mark.parametrize(
