@@ -20,7 +20,6 @@ import os
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from importlib.metadata import EntryPoint, entry_points
 from typing import Annotated, Any
 
@@ -107,6 +106,8 @@ def check(arguments: Sequence[str]) -> Mapping[str, Any]:
 def console_main() -> int:
     """Entry point of the console script; says so when its output could not be written."""
     garbage.begin_start()
+    # It has none here, and would look for them in every distribution that is installed.
+    os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     status = main()
     try:
         if sys.stdout is not None:  # None when the caller has closed it
@@ -233,6 +234,8 @@ def _load_or_explain(entry: EntryPoint) -> object:
 
 
 def _unknown_command(name: str, commands: Mapping[str, object]) -> Fault:
+    from difflib import get_close_matches
+
     close = get_close_matches(name, commands, n=1)
     remedy = f"did you mean {close[0]!r}?" if close else f"the commands are {', '.join(commands)}"
     return Fault("swarm", "", f"no such command {name!r}", remedy)
