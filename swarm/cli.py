@@ -19,7 +19,7 @@ import inspect
 import os
 import re
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib.metadata import EntryPoint, entry_points
 from typing import Annotated, Any
 
@@ -233,10 +233,15 @@ def _load_or_explain(entry: EntryPoint) -> object:
     return unavailable
 
 
-def _unknown_command(name: str, commands: Mapping[str, object]) -> Fault:
+def _alike(word: str, known: Iterable[str]) -> list[str]:
+    """The known word that was meant, perhaps; none or one."""
     from difflib import get_close_matches
 
-    close = get_close_matches(name, commands, n=1)
+    return get_close_matches(word, list(known), n=1)
+
+
+def _unknown_command(name: str, commands: Mapping[str, object]) -> Fault:
+    close = _alike(name, commands)
     remedy = f"did you mean {close[0]!r}?" if close else f"the commands are {', '.join(commands)}"
     return Fault("swarm", "", f"no such command {name!r}", remedy)
 
@@ -255,7 +260,7 @@ def _usage_fault(error: typer.TyperException, name: str | None) -> Fault:
     if not close:
         problem, _, close = problem.removesuffix("?").partition(". Did you mean ")
     if not close and (choice := _CHOICE.search(problem)) is not None:
-        close = ", ".join(map(repr, get_close_matches(choice[1], choice[2].split("'")[1::2], n=1)))
+        close = ", ".join(map(repr, _alike(choice[1], choice[2].split("'")[1::2])))
     remedy = f"did you mean {close.rstrip(')')}? {see[:1].upper()}{see[1:]}" if close else see
     return Fault(path, "", problem[:1].lower() + problem[1:], remedy)
 
