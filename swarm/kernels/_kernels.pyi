@@ -47,6 +47,8 @@ class KernelProblem:
     @property
     def n_task(self) -> int: ...
     @property
+    def certain(self) -> bool: ...
+    @property
     def horizon_s(self) -> float: ...
     @property
     def weight(
@@ -290,10 +292,25 @@ class RouteSearch:
             NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
         ],
         seed: int,
+        given_first_s: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ]
+        | None = None,
+        given_leg_s: Annotated[
+            NDArray[numpy.float64],
+            dict(shape=(None, None), order="C", device="cpu", writable=False),
+        ]
+        | None = None,
+        given_due_s: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ]
+        | None = None,
     ) -> None: ...
     def round(self, iterations: int, heat: float, threads: int) -> None: ...
     def polish(self, should_stop: object | None = None) -> None: ...
     def n_lane(self) -> int: ...
+    def most_iterations(self) -> int: ...
+    def iterations_for_full_heat(self) -> float: ...
     def best_value(self) -> float: ...
     def best(
         self,

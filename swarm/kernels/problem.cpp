@@ -71,6 +71,16 @@ std::vector<double> Problem::legs_s(int uav, const std::vector<int>& tasks) cons
     return legs_s;
 }
 
+bool Problem::alike(int uav, int other) const {
+    const auto same = [&](const auto& table) {
+        const auto* const a = table.data() + row(uav);
+        return std::equal(a, a + n_task_, table.data() + row(other));
+    };
+    return speed_m_s_[uav] == speed_m_s_[other] &&
+           ramps_[uav].acceleration_m_s2 == ramps_[other].acceleration_m_s2 &&
+           same(by_uav_.weight) && same(by_uav_.survival) && same(by_uav_.capable);
+}
+
 std::vector<int> Problem::fastest(const std::vector<int>& uavs) const {
     const auto as_fast = [this](int a, int b) {
         return pace_s_m_[a] <= pace_s_m_[b] &&
@@ -237,6 +247,7 @@ void bind_problem(nb::module_& module) {
             nb::arg("acceleration_m_s2").noconvert() = nb::none())
         .def_prop_ro("n_uav", &Problem::n_uav)
         .def_prop_ro("n_task", &Problem::n_task)
+        .def_prop_ro("certain", &Problem::certain)
         .def_prop_ro("horizon_s", &Problem::horizon_s)
         .def_prop_ro("weight",
                      [](nb::handle self) {

@@ -182,6 +182,9 @@ class Problem {
         return near_.data() + static_cast<std::size_t>(task) * n_near_;
     }
 
+    // Whether both fly all legs in equal times and have equal weights and survivals at every task.
+    bool alike(int uav, int other) const;
+
     // Working memory is kept from call to call; it changes speed, never results.
     std::unique_ptr<Workspace> borrow_workspace() const;
     void return_workspace(std::unique_ptr<Workspace> workspace) const;

@@ -1,8 +1,10 @@
 // Python face of the route optimiser; the work is done in routes_team.hpp and what it includes.
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -31,9 +33,11 @@ std::vector<double> copied(const Array& array) {
 class BoundSearch {
  public:
   BoundSearch(const Problem& problem, const StartArrays& start, const ListArrays& lists,
-              const Mask& open, std::uint64_t seed)
+              const Mask& open, std::uint64_t seed, std::optional<GivenTimes> given)
       : start_(start.start(problem)),
-        team_(problem, start_, lists.routes(), open_tasks(open), seed) {}
+        given_(std::move(given)),
+        team_(problem, start_, lists.routes(), open_tasks(open), seed,
+              given_ ? &*given_ : nullptr) {}
 
   void round(long iterations, double heat, int threads) {
     const nb::gil_scoped_release released;
@@ -45,11 +49,14 @@ class BoundSearch {
   }
 
   int n_lane() const { return team_.n_lane(); }
+  long most_iterations() const { return team_.most_iterations(); }
+  double iterations_for_full_heat() const { return team_.iterations_for_full_heat(); }
   double best_value() const { return team_.best_value(); }
   std::pair<IndexArray, IndexArray> best() const { return to_arrays(team_.best()); }
 
  private:
   Start start_;
+  std::optional<GivenTimes> given_;
   TeamSearch team_;
 };
 
@@ -71,18 +78,30 @@ void bind_routes(nb::module_& module) {
           "__init__",
           [](BoundSearch* self, const Problem& problem, const Vector& free_s,
              const Matrix& place_m, const Vector& survived, const Mask& active,
-             const Indices& flat, const Indices& offsets, const Mask& open, std::uint64_t seed) {
+             const Indices& flat, const Indices& offsets, const Mask& open, std::uint64_t seed,
+             const std::optional<Vector>& given_first_s, const std::optional<Matrix>& given_leg_s,
+             const std::optional<Vector>& given_due_s) {
+            std::optional<GivenTimes> given;
+            if (given_leg_s) {
+              given.emplace();
+              given->first_s = copied(*given_first_s);
+              given->leg_s = copied(*given_leg_s);
+              if (given_due_s) given->due_s = copied(*given_due_s);
+            }
             const nb::gil_scoped_release released;
             new (self) BoundSearch(problem, {free_s, place_m, survived, active}, {flat, offsets},
-                                   open, seed);
+                                   open, seed, std::move(given));
           },
           nb::keep_alive<1, 2>(), nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"),
           nb::arg("survived"), nb::arg("active"), nb::arg("flat"), nb::arg("offsets"),
-          nb::arg("open"), nb::arg("seed"))
+          nb::arg("open"), nb::arg("seed"), nb::arg("given_first_s") = nb::none(),
+          nb::arg("given_leg_s") = nb::none(), nb::arg("given_due_s") = nb::none())
       .def("round", &BoundSearch::round, nb::arg("iterations"), nb::arg("heat"),
            nb::arg("threads"))
       .def("polish", &BoundSearch::polish, nb::arg("should_stop") = nb::none())
       .def("n_lane", &BoundSearch::n_lane)
+      .def("most_iterations", &BoundSearch::most_iterations)
+      .def("iterations_for_full_heat", &BoundSearch::iterations_for_full_heat)
       .def("best_value", &BoundSearch::best_value)
       .def("best", &BoundSearch::best);
 

@@ -28,17 +28,12 @@ Routes = list[list[int]]
 _MAX_SEED = 2**64 - 1
 _SLICES = 64
 """At least so many steps of cooling, if that leaves each some iterations."""
-_MOST_IN_SLICE = 1000
 _FEWEST_IN_SLICE = 20
-_LONG_LIST = 100
-"""Tasks; the time of an iteration grows with the lists, so slices of longer ones are smaller."""
 _COOL_START = 0.3
 """Heat while it is unknown how long the search will be."""
 _FIRST_POLISH_FRAC, _LAST_POLISH_FRAC = 0.3, 0.05
 """Of a limit in time, the most that local search may take before the annealing, and what is kept
 for it afterwards."""
-_ITERATIONS_FOR_FULL_HEAT = 1600.0
-"""Per task; the annealing of a shorter search begins cooler, by the fourth root."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,6 +83,38 @@ class TeamArrays:
         )
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class GivenTimes:
+    """Times that do not follow from places and speeds, the same for every UAV.
+
+    Published instances round their distances, so that their values can be compared only so.
+
+    Raises:
+        ValueError: names the argument whose shape or numbers are wrong, or says that UAVs of the
+            mission may be lost.
+    """
+
+    first_s: npt.ArrayLike
+    """(n_task,) completion as the first of a list [s]."""
+    leg_s: npt.ArrayLike
+    """(n_task, n_task) from completing one task to completing another [s]."""
+    due_s: npt.ArrayLike | None = None
+    """(n_task,) a task is worth p·m·(due - t) and may be left out; None: p·m·(D - t), none may."""
+
+    def arguments(self, team: TeamArrays) -> tuple[FloatArray, FloatArray, FloatArray | None]:
+        """As the kernel takes them, checked against the team."""
+        if not team.problem.certain:
+            raise ValueError("given times need a mission in which survival is 1 everywhere")
+        if not np.asarray(team.open).all():
+            raise ValueError("given times need a team to which all tasks are open")
+        n = team.problem.n_task
+        return (
+            _floats("first_s", self.first_s, (n,)),
+            _floats("leg_s", self.leg_s, (n, n)),
+            None if self.due_s is None else _floats("due_s", self.due_s, (n,)),
+        )
+
+
 def optimise_routes(
     team: TeamArrays,
     *,
@@ -97,6 +124,7 @@ def optimise_routes(
     lists: Sequence[Sequence[int]] | None = None,
     progress: Callable[[int, float], None] | None = None,
     threads: int | None = None,
+    given: GivenTimes | None = None,
 ) -> tuple[Routes, float]:
     """Lists that hold every open task some active UAV is capable of, late ones too.
 
@@ -117,9 +145,11 @@ def optimise_routes(
         lists: to begin with, disjoint; tasks that are not open are dropped, missing ones added.
         progress: told the iterations so far and the best J to go after each slice.
         threads: at most this many; as many as there are processors when None.
+        given: times that do not follow from places; only where nobody is lost.
 
     Returns:
-        Lists per UAV, and Σ p·S·m·(D − t) over them [value·s].
+        Lists per UAV, and Σ p·S·m·(D − t) over them [value·s]; with given due times, Σ
+        p·S·m·(due − t) over lists that leave out what is not worth it.
 
     Raises:
         ValueError: names the argument that is wrong.
@@ -134,7 +164,12 @@ def optimise_routes(
         raise ValueError(f"threads must be >= 1, not {threads}")
     kernel_threads = (os.cpu_count() or 1) if threads is None else threads
     search = _kernels.RouteSearch(
-        team.problem, *team.arguments(), *open_lists(team, lists), np.asarray(team.open), seed
+        team.problem,
+        *team.arguments(),
+        *open_lists(team, lists),
+        np.asarray(team.open),
+        seed,
+        *((None,) * 3 if given is None else given.arguments(team)),
     )
 
     def time_spent_frac() -> float:
@@ -142,9 +177,8 @@ def optimise_routes(
 
     search.polish(lambda: not time_spent_frac() < _FIRST_POLISH_FRAC)
     lanes = search.n_lane()
-    n_open = int(np.sum(team.open))
-    length = team.problem.n_task / max(1, int(np.sum(team.active)))
-    most = int(_MOST_IN_SLICE * min(1.0, _LONG_LIST / max(1.0, length)))
+    full = int(np.sum(team.open)) * search.iterations_for_full_heat()
+    most = search.most_iterations()
     done = 0
     while True:
         if spent_frac is not None:
@@ -157,7 +191,7 @@ def optimise_routes(
         now = max(_FEWEST_IN_SLICE, min(most, int(total / lanes / _SLICES)))
         if iterations is not None:
             now = min(now, -(-(iterations - done) // lanes))
-        search.round(now, _heat(max(0.0, spent), total, n_open), kernel_threads)
+        search.round(now, _heat(max(0.0, spent), total, full), kernel_threads)
         done += now * lanes
         if progress is not None:
             progress(done, search.best_value())
@@ -165,12 +199,12 @@ def optimise_routes(
     return _routes(*search.best()), search.best_value()
 
 
-def _heat(spent_frac: float, total: float, n_task: int) -> float:
-    """Cool along what is spent, from a heat that a run of ``total`` iterations can afford."""
+def _heat(spent_frac: float, total: float, full: float) -> float:
+    """Cool along what is spent, from a heat that ``total`` iterations can afford; ``full``, all."""
     if total == 0.0:
         return _COOL_START
     # two square roots, not a power: their floats are the same everywhere
-    share = total / max(1, n_task) / _ITERATIONS_FOR_FULL_HEAT
+    share = total / max(1.0, full)
     return min(1.0, math.sqrt(math.sqrt(share))) * (1.0 - spent_frac)
 
 

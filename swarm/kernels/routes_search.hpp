@@ -9,6 +9,7 @@
 #include <utility>
 #include <vector>
 
+#include "routes_lane.hpp"
 #include "routes_random.hpp"
 #include "routes_solution.hpp"
 
@@ -17,19 +18,19 @@ namespace peckorder {
 // Put every capable open task that is on no list where J gains most, most valuable first.
 void insert_missing(Solution& solution, const std::vector<int>& tasks);
 
-class Search {
+class Search : public Lane {
  public:
   Search(const Problem& problem, const Start& start, std::uint64_t seed);
 
   // Work on the lists of these UAVs alone; best := current.
-  void load(const std::vector<Route>& routes, const std::vector<int>& uavs);
+  void load(const std::vector<Route>& routes, const std::vector<int>& uavs) override;
 
-  void run(long iterations, double temperature);
+  void run(long iterations, double temperature) override;
 
-  const Solution& current() const { return current_; }
-  const std::vector<int>& uavs() const { return current_.allowed(); }
-  double best_value() const { return best_value_; }
-  const Route& best_route(int uav) const { return best_[uav]; }
+  const std::vector<int>& uavs() const override { return current_.allowed(); }
+  double best_value() const override { return best_value_; }
+  const Route& best_route(int uav) const override { return best_[uav]; }
+  const Route& current_route(int uav) const override { return current_.route(uav); }
 
  private:
   void ruin();

@@ -14,6 +14,7 @@ constexpr int kFewestLanes = 2, kMostLanes = 8;
 constexpr int kUavsPerLane = 12;
 constexpr int kUavsToDivide = 10;   // fewer are not divided
 constexpr double kHottest = 1.5;    // of the mean delay; about the cost of a clumsy insertion
+constexpr int kShortList = 15;    // tasks a UAV, up to which Search is as good
 constexpr int kHeatSteps = 64;
 constexpr double kHeatRatio = 0.930572040929699;  // its 64th power is 1/100
 
@@ -28,22 +29,44 @@ double temperature(double hottest, double heat) {
 }  // namespace
 
 TeamSearch::TeamSearch(const Problem& problem, const Start& start, std::vector<Route> lists,
-                       const std::vector<int>& tasks, std::uint64_t seed)
-    : problem_(problem), start_(start), random_(seed), current_(std::move(lists)) {
+                       const std::vector<int>& tasks, std::uint64_t seed, const GivenTimes* given)
+    : problem_(problem),
+      start_(start),
+      random_(seed),
+      given_(given != nullptr),
+      current_(std::move(lists)) {
   Solution solution(problem, start);
   uavs_ = solution.allowed();
-  for (const int uav : uavs_) solution.set_route(uav, current_[uav]);
-  insert_missing(solution, tasks);
-  current_ = best_ = solution.routes();
-  best_value_ = solution.total();
-  hottest_ = kHottest * solution.mean_delay();
-  divided_ = static_cast<int>(uavs_.size()) >= kUavsToDivide;
+  const double length = static_cast<double>(tasks.size()) / std::max<std::size_t>(1, uavs_.size());
+  if (given_ || (problem.certain() && length > kShortList)) terms_.emplace(problem, start, given);
+  most_iterations_ = static_cast<long>(terms_ ? 400.0 / std::max(1.0, length / 100.0)
+                                              : 1000.0 / std::max(1.0, length / 100.0));
+  if (given_) {
+    GranularSearch first(*terms_, random_.bits());
+    first.load(current_, uavs_);
+    first.settle(tasks);
+    for (const int uav : uavs_) current_[uav] = first.current_route(uav);
+    best_value_ = first.best_value();
+    hottest_ = kHottest * first.mean_delay();
+  } else {
+    for (const int uav : uavs_) solution.set_route(uav, current_[uav]);
+    insert_missing(solution, tasks);
+    current_ = solution.routes();
+    best_value_ = solution.total();
+    hottest_ = kHottest * solution.mean_delay();
+  }
+  best_ = current_;
+  divided_ = !given_ && static_cast<int>(uavs_.size()) >= kUavsToDivide;
   const int lanes = std::min(
       kMostLanes, std::max(kFewestLanes, static_cast<int>(uavs_.size()) / kUavsPerLane));
   lanes_.reserve(lanes);
   for (int lane = 0; lane < lanes; ++lane) {
-    lanes_.emplace_back(problem, start, random_.bits());
-    if (!divided_) lanes_.back().load(current_, uavs_);
+    const std::uint64_t bits = random_.bits();
+    if (terms_)
+      lanes_.push_back(std::make_unique<GranularSearch>(*terms_, bits));
+    else
+      lanes_.push_back(std::make_unique<Search>(problem, start, bits));
+    if (!divided_) lanes_.back()->load(current_, uavs_);
   }
 }
 
@@ -54,7 +77,7 @@ void TeamSearch::round(long iterations, double heat, int threads) {
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t lane; (lane = next.fetch_add(1)) < lanes_.size();)
-      lanes_[lane].run(iterations, now);
+      lanes_[lane]->run(iterations, now);
   };
   std::vector<std::thread> helpers;
   for (int k = 1; k < std::min<int>(threads, n_lane()); ++k) helpers.emplace_back(work);
@@ -64,13 +87,14 @@ void TeamSearch::round(long iterations, double heat, int threads) {
 }
 
 void TeamSearch::polish(Watch& watch) {
+  if (given_) return;  // lanes have descended themselves
   Solution solution(problem_, start_);
   for (const int uav : uavs_) solution.set_route(uav, best_[uav]);
   improve(solution, uavs_, watch);
   current_ = best_ = solution.routes();
   best_value_ = solution.total();
   if (divided_) return;  // each round loads its lanes anew
-  for (Search& lane : lanes_) lane.load(current_, uavs_);
+  for (auto& lane : lanes_) lane->load(current_, uavs_);
 }
 
 // As many UAVs to each lane, by the middles of their lists along a random direction.
@@ -98,27 +122,27 @@ void TeamSearch::divide() {
     std::vector<int> part;
     for (; from < to; ++from) part.push_back(order[from].second);
     std::sort(part.begin(), part.end());
-    lanes_[lane].load(current_, part);
+    lanes_[lane]->load(current_, part);
   }
 }
 
 void TeamSearch::join() {
   double value = 0.0;
   if (!divided_) {
-    for (const Search& lane : lanes_) {
-      if (!(lane.best_value() > best_value_)) continue;
-      best_value_ = lane.best_value();
-      for (const int uav : uavs_) best_[uav] = lane.best_route(uav);
+    for (const auto& lane : lanes_) {
+      if (!(lane->best_value() > best_value_)) continue;
+      best_value_ = lane->best_value();
+      for (const int uav : uavs_) best_[uav] = lane->best_route(uav);
     }
     return;
   }
-  for (const Search& lane : lanes_) value += lane.best_value();
+  for (const auto& lane : lanes_) value += lane->best_value();
   const bool better = value > best_value_;
   if (better) best_value_ = value;
-  for (const Search& lane : lanes_) {
-    for (const int uav : lane.uavs()) {
-      if (better) best_[uav] = lane.best_route(uav);
-      current_[uav] = lane.current().route(uav);
+  for (const auto& lane : lanes_) {
+    for (const int uav : lane->uavs()) {
+      if (better) best_[uav] = lane->best_route(uav);
+      current_[uav] = lane->current_route(uav);
     }
   }
 }

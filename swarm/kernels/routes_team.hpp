@@ -6,8 +6,11 @@
 // are not divided: each lane then searches the whole by its own random numbers.
 #pragma once
 
+#include <memory>
+#include <optional>
 #include <vector>
 
+#include "routes_granular.hpp"
 #include "routes_search.hpp"
 #include "watch.hpp"
 
@@ -15,11 +18,20 @@ namespace peckorder {
 
 class TeamSearch {
  public:
+  // Long lists on which nobody is lost are searched by GranularSearch, others by Search. `given` may
+  // be null and must live longer, as must the others.
   TeamSearch(const Problem& problem, const Start& start, std::vector<Route> lists,
-             const std::vector<int>& tasks, std::uint64_t seed);
+             const std::vector<int>& tasks, std::uint64_t seed, const GivenTimes* given = nullptr);
+
+  TeamSearch(const TeamSearch&) = delete;
+  TeamSearch& operator=(const TeamSearch&) = delete;
 
   // `iterations` per lane; heat within 0..1, 1 at the beginning of the annealing, 0 at its end.
   void round(long iterations, double heat, int threads);
+
+  // Iterations per lane that take some 10 ms, and per task that an annealing from full heat takes.
+  long most_iterations() const { return most_iterations_; }
+  double iterations_for_full_heat() const { return terms_ ? 3000.0 : 1600.0; }
 
   // Local search on the best lists, until no move gains or the watch stops it; the search goes on
   // from there.
@@ -37,11 +49,14 @@ class TeamSearch {
   const Start& start_;
   Random random_;
   std::vector<int> uavs_;
-  std::vector<Search> lanes_;
+  std::optional<RouteTerms> terms_;  // of granular lanes
+  bool given_;
+  std::vector<std::unique_ptr<Lane>> lanes_;
   bool divided_;
   std::vector<Route> current_, best_;
   double best_value_;
   double hottest_;
+  long most_iterations_;
 };
 
 }  // namespace peckorder
