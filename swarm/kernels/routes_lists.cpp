@@ -9,14 +9,11 @@ namespace peckorder {
 TimedLists::TimedLists(const RouteTerms& terms)
     : terms_(&terms),
       list_of_(terms.n_task(), -1),
-      place_of_(terms.n_task(), 0),
-      list_of_uav_(terms.n_uav(), -1) {}
+      place_of_(terms.n_task(), 0) {}
 
 void TimedLists::load(const std::vector<Route>& routes, const std::vector<int>& uavs) {
   std::fill(list_of_.begin(), list_of_.end(), -1);
-  std::fill(list_of_uav_.begin(), list_of_uav_.end(), -1);
   uav_of_list_ = uavs;
-  for (std::size_t list = 0; list < uavs.size(); ++list) list_of_uav_[uavs[list]] = int(list);
   if (terms_->leaves_out()) uav_of_list_.push_back(-1);
   const std::size_t n = uav_of_list_.size();
   lists_.assign(n, {});
@@ -79,17 +76,20 @@ void TimedLists::fly(Flight& flight, const Route& route, int uav, bool own, int 
   }
 }
 
-const TimedLists::Flight& TimedLists::flight(int list, int uav) {
-  if (this->uav(list) == uav || terms_->alike(this->uav(list), uav)) return own_[list];
-  Flight& found = foreign_[list][list_of_uav_[uav]];
-  if (!found.known) fly(found, lists_[list], uav, false, 0);
+// As the UAV of list `to` flies it.
+const TimedLists::Flight& TimedLists::flight(int list, int to) {
+  if (list == to || terms_->alike(uav(list), uav(to))) return own_[list];
+  Flight& found = foreign_[list][to];
+  if (!found.known) fly(found, lists_[list], uav(to), false, 0);
   return found;
 }
 
 Segment TimedLists::part(const Flight& flight, const Route& route, const Piece& piece) const {
   const Sums& first = flight.sums[piece.begin];
   const Sums& last = flight.sums[piece.end - 1];
-  const Sums before = piece.begin > flight.capable_from ? flight.sums[piece.begin - 1] : Sums{};
+  static constexpr Sums kNone{};
+  const Sums& before =
+      piece.begin > flight.capable_from ? flight.sums[piece.begin - 1] : kNone;
   const double weight = last.weight - before.weight;
   if (piece.turned)
     return {route[piece.end - 1], route[piece.begin], last.back_s - first.back_s,
@@ -113,7 +113,7 @@ bool TimedLists::append(Cursor& cursor, int list, const Piece& piece) {
     const double weight = terms_->weight(uav, task);
     segment = {task, task, 0.0, weight * terms_->due_s(task), weight, 1.0};
   } else {
-    const Flight& flown = flight(piece.list, uav);
+    const Flight& flown = flight(piece.list, list);
     if (piece.begin < flown.capable_from) {
       for (int k = piece.begin; k < piece.end; ++k) {
         const int task = piece.turned ? route[piece.end - 1 - (k - piece.begin)] : route[k];

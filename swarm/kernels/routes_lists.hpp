@@ -14,10 +14,8 @@ namespace peckorder {
 
 // Tasks begin..end-1 of a list, or these from the last to the first.
 struct Piece {
-  int list = 0;
-  int begin = 0;
-  int end = 0;
-  bool turned = false;
+  int list, begin, end;
+  bool turned;
 
   int size() const { return end - begin; }
 };
@@ -28,9 +26,8 @@ struct Recipe {
 
   double gain = 0.0;
   int lists = 0;
-  int list[2] = {-1, -1};
-  int pieces[2] = {0, 0};
-  Piece piece[2][kMostPieces];
+  int list[2], pieces[2];
+  Piece piece[2][kMostPieces];  // only so many of them are set
 
   void begin(int of) {
     list[lists] = of;
@@ -100,7 +97,7 @@ class TimedLists {
     double worth = 0.0;
   };
 
-  const Flight& flight(int list, int uav);
+  const Flight& flight(int list, int to);
   void fly(Flight& flight, const Route& route, int uav, bool own, int from) const;
   Segment part(const Flight& flight, const Route& route, const Piece& piece) const;
   bool append(Cursor& cursor, int list, const Piece& piece);
@@ -113,7 +110,6 @@ class TimedLists {
   std::vector<Flight> own_;
   std::vector<std::vector<Flight>> foreign_;  // [list][list whose UAV flies it]
   std::vector<int> list_of_, place_of_;
-  std::vector<int> list_of_uav_;
   Route composed_[2];
 };
 

@@ -5,10 +5,9 @@
 namespace peckorder {
 
 namespace {
-constexpr int kNear = 10;
+constexpr int kNear = 7;
 constexpr int kMostCarried = 3;    // tasks from list to list at a time
-constexpr int kMostWithin = 8;     // tasks to another place of their list at a time
-constexpr double kLongerLeg = 1.0;  // of the longer leg that gives way: new legs beyond are left
+constexpr int kMostWithin = 3;     // tasks to another place of their list at a time
 }  // namespace
 
 void MoveFinder::offer(Recipe& recipe) {
@@ -55,14 +54,15 @@ void MoveFinder::follow(int x, int y) {
     const Route& route = lists_.route(list);
     return terms.leg_s(lists_.uav(list), route[place], route[place + 1]);
   };
-  if (new_s > kLongerLeg * std::max(leg_after(a, p), leg_after(b, q - 1))) return;
+  const bool after_x = new_s < leg_after(a, p), before_y = new_s < leg_after(b, q - 1);
+  if (!after_x && !before_y) return;  // no shorter than either leg that may give way
   if (a == b)
-    follow_within(a, p, q);
+    follow_within(a, p, q, after_x, before_y);
   else
     follow_across(a, p, b, q);
 }
 
-void MoveFinder::follow_within(int list, int p, int q) {
+void MoveFinder::follow_within(int list, int p, int q, bool after_x, bool before_y) {
   const int n = lists_.size(list);
   const auto offer_parts = [&](int from, int middle, int to, bool turn_first, bool turn_second) {
     // [from, middle) and [middle, to) change places
@@ -83,8 +83,8 @@ void MoveFinder::follow_within(int list, int p, int q) {
     offer(recipe);
   };
   if (p < q) {
-    offer_turned(p + 1, q + 1);
-    offer_turned(p, q);
+    if (after_x) offer_turned(p + 1, q + 1);
+    if (before_y) offer_turned(p, q);
     for (int length = 1; length <= kMostWithin; ++length) {
       if (q + length <= n) offer_parts(p + 1, q, q + length, false, false);
       if (q + 1 - length > p + 1) offer_parts(p + 1, q + 1 - length, q + 1, false, true);

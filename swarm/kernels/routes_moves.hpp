@@ -17,7 +17,7 @@ class MoveFinder {
 
  private:
   void follow(int x, int y);       // let y come right after x
-  void follow_within(int list, int p, int q);
+  void follow_within(int list, int p, int q, bool after_x, bool before_y);
   void follow_across(int a, int p, int b, int q);
   void to_front(int task);
   void leave_out(int task);

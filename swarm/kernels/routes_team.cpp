@@ -14,6 +14,7 @@ constexpr int kFewestLanes = 2, kMostLanes = 8;
 constexpr int kUavsPerLane = 12;
 constexpr int kUavsToDivide = 10;   // fewer are not divided
 constexpr double kHottest = 1.5;    // of the mean delay; about the cost of a clumsy insertion
+constexpr double kHottestGranular = 3.0;  // found on published instances, as are its iterations
 constexpr int kShortList = 15;    // tasks a UAV, up to which Search is as good
 constexpr int kHeatSteps = 64;
 constexpr double kHeatRatio = 0.930572040929699;  // its 64th power is 1/100
@@ -47,13 +48,13 @@ TeamSearch::TeamSearch(const Problem& problem, const Start& start, std::vector<R
     first.settle(tasks);
     for (const int uav : uavs_) current_[uav] = first.current_route(uav);
     best_value_ = first.best_value();
-    hottest_ = kHottest * first.mean_delay();
+    hottest_ = kHottestGranular * first.mean_delay();
   } else {
     for (const int uav : uavs_) solution.set_route(uav, current_[uav]);
     insert_missing(solution, tasks);
     current_ = solution.routes();
     best_value_ = solution.total();
-    hottest_ = kHottest * solution.mean_delay();
+    hottest_ = (terms_ ? kHottestGranular : kHottest) * solution.mean_delay();
   }
   best_ = current_;
   divided_ = !given_ && static_cast<int>(uavs_.size()) >= kUavsToDivide;

@@ -31,7 +31,7 @@ class TeamSearch {
 
   // Iterations per lane that take some 10 ms, and per task that an annealing from full heat takes.
   long most_iterations() const { return most_iterations_; }
-  double iterations_for_full_heat() const { return terms_ ? 3000.0 : 1600.0; }
+  double iterations_for_full_heat() const { return terms_ ? 200.0 : 1600.0; }
 
   // Local search on the best lists, until no move gains or the watch stops it; the search goes on
   // from there.
