@@ -12,10 +12,10 @@ namespace peckorder {
 namespace {
 constexpr int kFewestLanes = 2, kMostLanes = 8;
 constexpr int kUavsPerLane = 12;
-constexpr int kUavsToDivide = 10;   // fewer are not divided
-constexpr double kHottest = 1.5;    // of the mean delay; about the cost of a clumsy insertion
-constexpr double kHottestGranular = 3.0;  // found on published instances, as are its iterations
-constexpr int kShortList = 15;    // tasks a UAV, up to which Search is as good
+constexpr int kUavsToDivide = 10;  // fewer are not divided
+constexpr double kHottest = 1.5;  // of the mean delay; about the cost of a clumsy insertion
+constexpr double kHottestGranular = 3.0;  // measured on published instances
+constexpr int kShortList = 80;     // tasks a UAV; up to some 60, Search does as well or better
 constexpr int kHeatSteps = 64;
 constexpr double kHeatRatio = 0.930572040929699;  // its 64th power is 1/100
 
