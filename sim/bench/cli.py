@@ -189,6 +189,58 @@ def decide(
     return 0
 
 
+@bench.command("routes", short_help="Search published instances.")
+def routes(
+    instances: Annotated[
+        Path,
+        typer.Option(
+            "--instances",
+            metavar="DIR",
+            help="Folder of instances, and of tables *.csv (file,best_known) that name them.",
+            show_default=False,
+        ),
+    ],
+    only: Annotated[
+        str | None,
+        typer.Option(
+            "--only",
+            metavar="NAME,…",
+            help="Files to search, such as st70.tsp or 'Pr_200_*'. Default: all.",
+            show_default=False,
+        ),
+    ] = None,
+    time_limit_s: Annotated[
+        str, typer.Option("--time-limit-s", metavar="S", help="Time for each search.")
+    ] = "10",
+    seeds: Annotated[
+        str, typer.Option("--seeds", metavar="N,…", help="Of the searches of each instance.")
+    ] = ",".join(map(str, range(10))),
+    json: JsonOption = False,
+) -> int:
+    """Search published instances, and compare with the best values known.
+
+    Reads travelling repairman instances (TSPLIB files) and ones of multiple travelling
+    repairmen with profits, whose objectives are special cases of a mission's. Their own rounded
+    distances are searched as swarm plan searches a mission, and the published objective is
+    reckoned anew from the routes found. With --json the routes are told, for others to check.
+
+    Examples:
+        swarm bench routes --instances benchmarks
+        swarm bench routes --instances benchmarks --only st70.tsp --time-limit-s 2 --seeds 0,1
+        swarm bench routes --instances benchmarks --json
+    """
+    from sim.bench.instances import read_instances
+    from sim.bench.routes import measure_routes
+
+    limit_s = _limit_s("--time-limit-s", time_limit_s)
+    all_seeds = each("--seeds", seeds, _SEED)
+    found = read_instances(instances, only)
+    with progress() as tell:
+        done = measure_routes(found, all_seeds, limit_s, tell=tell)
+    show(done, json=json)
+    return 0
+
+
 bench.command("failover", short_help="Measure fleets in trouble.")(failover)
 bench.command("flood", short_help="Fly while a hostile peer floods the bus.")(flood)
 bench.command("missions", short_help="Fly many missions in virtual time.")(missions)

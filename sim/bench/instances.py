@@ -7,15 +7,18 @@ with profits (Avci and Avci 2017, doi:10.1016/j.cor.2017.06.008): the first line
 tasks and of UAVs, each line after it x, y and profit, first of the depot; distances are rounded,
 halves up; what is not worth its arrival is left out.
 
-A file `*.csv` with the columns `file` and `best_known` says which files of its folder, or of folders
-in it, are instances.
+A file `*.csv` with the columns `file` and `best_known` says which files of its folder, or of
+folders in it, are instances.
 """
 
 from __future__ import annotations
 
 import csv
+import difflib
+import fnmatch
+import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from pathlib import Path
@@ -25,6 +28,7 @@ import numpy.typing as npt
 
 from swarm.allocation.problem import Problem
 from swarm.kernels.routes import GivenTimes
+from swarm.model import TaskId, UavId
 from swarm.runtime.errors import Fault, InputError
 
 FloatArray = npt.NDArray[np.float64]
@@ -69,8 +73,8 @@ class Instance:
         n_uav, n_task = self.n_uav, self.n_task
         place_m = np.column_stack([self.place, np.zeros(n_task + 1)])
         return Problem(
-            uav_ids=tuple(f"uav{uav + 1}" for uav in range(n_uav)),
-            task_ids=tuple(f"node{task + 2}" for task in range(n_task)),
+            uav_ids=tuple(UavId(f"uav{uav + 1}") for uav in range(n_uav)),
+            task_ids=tuple(TaskId(f"node{task + 2}") for task in range(n_task)),
             start_enu_m=np.repeat(place_m[:1], n_uav, axis=0),
             task_enu_m=place_m[1:],
             speed_m_s=np.ones(n_uav),
@@ -98,15 +102,38 @@ class Instance:
         return worse / abs(self.best_known) if self.best_known else worse
 
 
-def read_instances(folder: Path) -> list[Instance]:
-    """All that the tables in ``folder`` and below name, by table and line.
+def read_instances(folder: Path, only: str | None = None) -> list[Instance]:
+    """What the tables in ``folder`` and below name, by table and line.
+
+    Args:
+        folder: where to look.
+        only: patterns of file names between commas, such as ``st70.tsp,Pr_200_*``; others are not
+            read. All when None.
 
     Raises:
-        InputError: no table, or a table or an instance that cannot be read.
+        InputError: no table, a table or an instance that cannot be read, or a pattern that
+            names none.
     """
     if not folder.is_dir():
         raise InputError(Fault("--instances", str(folder), "not a folder", "give a folder"))
-    found = []
+    named = list(_named(folder))
+    if not named:
+        problem = "no table *.csv of instances in it or below"
+        raise InputError(Fault("--instances", str(folder), problem, "add one: file,best_known"))
+    patterns = ["*"] if only is None else [word.strip() for word in only.split(",")]
+    names = [path.name for path, _ in named]
+    for pattern in patterns:
+        if not fnmatch.filter(names, pattern):
+            alike = difflib.get_close_matches(pattern, names) or names[:3]
+            raise InputError(
+                Fault("--only", pattern, "names no instance", f"name some, as {', '.join(alike)}")
+            )
+    chosen = [any(fnmatch.fnmatchcase(name, each) for each in patterns) for name in names]
+    return [_read(path, best) for path, best in itertools.compress(named, chosen)]
+
+
+def _named(folder: Path) -> Iterator[tuple[Path, float]]:
+    """Instances and their best known values."""
     for table in sorted(folder.rglob("*.csv")):
         for line, row in enumerate(csv.DictReader(_text(table).splitlines()), start=2):
             name, best = row.get("file"), row.get("best_known")
@@ -114,14 +141,11 @@ def read_instances(folder: Path) -> list[Instance]:
                 raise _fault(table, 1, "no columns file and best_known", "begin with their names")
             if not _is_number(best):
                 raise _fault(table, line, f"best_known is {best!r}", "give a number")
-            paths = sorted(table.parent.rglob(name)) if name else []
+            usable = name and not Path(name).is_absolute()
+            paths = sorted(table.parent.rglob(name)) if usable else []
             if not paths:
                 raise _fault(table, line, f"no file {name!r} here or below", "name one that is")
-            found.append(_read(paths[0], float(best)))
-    if not found:
-        problem = "no table *.csv of instances in it or below"
-        raise InputError(Fault("--instances", str(folder), problem, "add one: file,best_known"))
-    return found
+            yield paths[0], float(best)
 
 
 def _read(path: Path, best_known: float) -> Instance:
@@ -144,7 +168,8 @@ def _read(path: Path, best_known: float) -> Instance:
 
 
 def _read_tsplib(path: Path) -> tuple[FloatArray, FloatArray]:
-    kind, nodes, in_nodes = "", [], False
+    kind, in_nodes = "", False
+    nodes: list[list[float]] = []
     for line, text in enumerate(_text(path).splitlines(), start=1):
         key, _, rest = text.partition(":")
         if key.strip() == "EDGE_WEIGHT_TYPE":
@@ -154,10 +179,10 @@ def _read_tsplib(path: Path) -> tuple[FloatArray, FloatArray]:
         elif key.strip() == "EOF":
             break
         elif in_nodes and text.strip():
-            number, *place = _numbers(path, line, text.split(), 3)
+            number, *at = _numbers(path, line, text.split(), 3)
             if number != len(nodes) + 1:
                 raise _fault(path, line, f"node {number:g} is out of turn", "number from 1 on")
-            nodes.append(place)
+            nodes.append(at)
     if len(nodes) < 2:
         raise _fault(path, 1, "fewer than two nodes", "give NODE_COORD_SECTION")
     place = np.array(nodes)

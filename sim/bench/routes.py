@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import RenderableType
 
 from sim.bench.instances import Instance
-from sim.bench.machine import MachineInfo, this_machine
+from sim.bench.machine import this_machine
 from sim.bench.results import BenchResult, Progress, table_of, unheard
 from swarm.allocation.rules import team_at_start
 from swarm.kernels.routes import optimise_routes
