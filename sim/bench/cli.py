@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sim.bench.command_line import LONGEST_S, each, integer, progress, show, size_of
+from sim.bench.command_line import (
+    LONGEST_S,
+    SEED,
+    check_files,
+    each,
+    limit_of,
+    progress,
+    show,
+    size_of,
+    write_file,
+)
 from sim.bench.legs import legs
 from sim.bench.performance_commands import (
     autopilot,
@@ -21,6 +30,7 @@ from sim.bench.robustness_commands import (
     flood,
     secure,
 )
+from sim.bench.route_commands import routes
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 from swarm.runtime.options import JsonOption, SeedOption
 from swarm.scenario.files import resolve_scenario
@@ -30,7 +40,6 @@ if TYPE_CHECKING:
 
 _DEFAULT_SIZES = "10x50,50x500"
 _SCALING_SIZES = "10x50,10x500,50x500,50x2000,100x1000,200x2000,200x5000"
-_SEED = integer(0, 10**18 - 1, "no seed", "give whole numbers from 0 on, such as 0,1")
 bench = typer.Typer(
     help="Benchmarks, each printing machine, seeds and ratios.",
     rich_markup_mode=None,
@@ -139,11 +148,11 @@ def plan(
     from sim.bench.plans import measure_plans
     from sim.bench.solvers import METHODS
 
-    limits_s = each("--time-limit-s", time_limit_s, _limit_s)
-    all_seeds = each("--seeds", seeds, _SEED)
+    limits_s = each("--time-limit-s", time_limit_s, limit_of)
+    all_seeds = each("--seeds", seeds, SEED)
     default_methods = "guided,greedy" if scaling else ",".join(METHODS)
     names = each("--methods", methods or default_methods, _method)
-    _check_files(plot, out)
+    check_files(plot, out)
     if scaling:
         limits_s, all_seeds = limits_s[:1], all_seeds[:1]
     sources = _sources(scenario, sizes, _SCALING_SIZES if scaling else _DEFAULT_SIZES)
@@ -158,9 +167,9 @@ def plan(
     report = PlanReport(done.machine, done, grids)
     if plot is not None:
         figure = scaling_figure(done) if scaling else comparison_figure(done)
-        _write("--plot", plot, lambda path: write_figure(figure, path))
+        write_file("--plot", plot, lambda path: write_figure(figure, path))
     if out is not None:
-        _write("--out", out, lambda path: path.write_text(report.as_markdown(), encoding="utf-8"))
+        write_file("--out", out, lambda path: path.write_text(report.as_markdown(), "utf-8"))
     show(report, json=json)
     return 0
 
@@ -189,58 +198,7 @@ def decide(
     return 0
 
 
-@bench.command("routes", short_help="Search published instances.")
-def routes(
-    instances: Annotated[
-        Path,
-        typer.Option(
-            "--instances",
-            metavar="DIR",
-            help="Folder of instances, and of tables *.csv (file,best_known) that name them.",
-            show_default=False,
-        ),
-    ],
-    only: Annotated[
-        str | None,
-        typer.Option(
-            "--only",
-            metavar="NAME,…",
-            help="Files to search, such as st70.tsp or 'Pr_200_*'. Default: all.",
-            show_default=False,
-        ),
-    ] = None,
-    time_limit_s: Annotated[
-        str, typer.Option("--time-limit-s", metavar="S", help="Time for each search.")
-    ] = "10",
-    seeds: Annotated[
-        str, typer.Option("--seeds", metavar="N,…", help="Of the searches of each instance.")
-    ] = ",".join(map(str, range(10))),
-    json: JsonOption = False,
-) -> int:
-    """Search published instances, and compare with the best values known.
-
-    Reads travelling repairman instances (TSPLIB files) and ones of multiple travelling
-    repairmen with profits, whose objectives are special cases of a mission's. Their own rounded
-    distances are searched as swarm plan searches a mission, and the published objective is
-    reckoned anew from the routes found. With --json the routes are told, for others to check.
-
-    Examples:
-        swarm bench routes --instances benchmarks
-        swarm bench routes --instances benchmarks --only st70.tsp --time-limit-s 2 --seeds 0,1
-        swarm bench routes --instances benchmarks --json
-    """
-    from sim.bench.instances import read_instances
-    from sim.bench.routes import measure_routes
-
-    limit_s = _limit_s("--time-limit-s", time_limit_s)
-    all_seeds = each("--seeds", seeds, _SEED)
-    found = read_instances(instances, only)
-    with progress() as tell:
-        done = measure_routes(found, all_seeds, limit_s, tell=tell)
-    show(done, json=json)
-    return 0
-
-
+bench.command("routes", short_help="Search published instances.")(routes)
 bench.command("failover", short_help="Measure fleets in trouble.")(failover)
 bench.command("flood", short_help="Fly while a hostile peer floods the bus.")(flood)
 bench.command("missions", short_help="Fly many missions in virtual time.")(missions)
@@ -269,17 +227,6 @@ def _sources(
     return found
 
 
-def _limit_s(flag: str, word: str) -> float:
-    try:
-        limit_s = float(word)
-    except ValueError:
-        limit_s = -1.0
-    if not 0.0 < limit_s <= LONGEST_S:
-        remedy = "give seconds above 0, such as 10 or 1,3,10"
-        raise InputError(Fault(flag, word, "no time limit", remedy))
-    return limit_s
-
-
 def _method(flag: str, word: str) -> str:
     from sim.bench.solvers import METHODS
 
@@ -287,26 +234,3 @@ def _method(flag: str, word: str) -> str:
         remedy = remedy_for_name(word, METHODS, "choose among")
         raise InputError(Fault(flag, word, "no such method", remedy))
     return word
-
-
-def _check_files(plot: Path | None, out: Path | None) -> None:
-    """Refuse what cannot be written before anything is measured."""
-    from coordinator.plot import PLOT_SUFFIXES
-
-    faults = []
-    if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
-        remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"
-        faults.append(Fault("--plot", str(plot), "no picture has this suffix", remedy))
-    for flag, path in (("--plot", plot), ("--out", out)):
-        if path is not None and not path.absolute().parent.is_dir():
-            faults.append(Fault(flag, str(path), "its folder is not there", "make it first"))
-    if faults:
-        raise InputError(*faults)
-
-
-def _write(flag: str, path: Path, write: Callable[[Path], object]) -> None:
-    try:
-        write(path)
-    except OSError as error:
-        problem = f"cannot write {path}: {error.strerror or error}"
-        raise InputError(Fault(flag, "", problem, "name a file that can be")) from error

@@ -58,6 +58,10 @@ def integer(least: int, most: int, problem: str, remedy: str) -> Reader[int]:
     return read
 
 
+SEED = integer(0, 10**18 - 1, "no seed", "give whole numbers from 0 on, such as 0,1")
+"""Reads a seed."""
+
+
 def size_of(flag: str, word: str) -> tuple[int, int]:
     """How many UAVs and tasks ``word`` stands for.
 
@@ -68,6 +72,54 @@ def size_of(flag: str, word: str) -> tuple[int, int]:
     if match is None:
         raise InputError(Fault(flag, word, "no size", "write UAVs x tasks, such as 50x500"))
     return int(match[1]), int(match[2])
+
+
+def limit_of(flag: str, word: str) -> float:
+    """The time limit that ``word`` stands for [s].
+
+    Raises:
+        InputError: it is none.
+    """
+    try:
+        limit_s = float(word)
+    except ValueError:
+        limit_s = -1.0
+    if not 0.0 < limit_s <= LONGEST_S:
+        remedy = "give seconds above 0, such as 10 or 1,3,10"
+        raise InputError(Fault(flag, word, "no time limit", remedy))
+    return limit_s
+
+
+def check_files(plot: Path | None, out: Path | None) -> None:
+    """Refuse what cannot be written before anything is measured.
+
+    Raises:
+        InputError: a suffix that no picture has, or no such folder.
+    """
+    from coordinator.plot import PLOT_SUFFIXES
+
+    faults = []
+    if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
+        remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"
+        faults.append(Fault("--plot", str(plot), "no picture has this suffix", remedy))
+    for flag, path in (("--plot", plot), ("--out", out)):
+        if path is not None and not path.absolute().parent.is_dir():
+            faults.append(Fault(flag, str(path), "its folder is not there", "make it first"))
+    if faults:
+        raise InputError(*faults)
+
+
+def write_file(flag: str, path: Path, write: Callable[[Path], object]) -> None:
+    """Write what ``flag`` asks for.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    try:
+        write(path)
+    except OSError as error:
+        problem = f"cannot write {path}: {error.strerror or error}"
+        raise InputError(Fault(flag, "", problem, "name a file that can be")) from error
 
 
 def bus_of(word: str) -> BusKind:

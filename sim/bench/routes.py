@@ -1,4 +1,4 @@
-"""How near `guided`'s search comes to the best values known of published instances."""
+"""How near `guided`'s search, and others, come to the best values known of published instances."""
 
 from __future__ import annotations
 
@@ -13,10 +13,8 @@ from rich.console import RenderableType
 from sim.bench.instances import Instance
 from sim.bench.machine import this_machine
 from sim.bench.results import BenchResult, Progress, table_of, unheard
-from swarm.allocation.rules import team_at_start
-from swarm.kernels.routes import optimise_routes
-from swarm.runtime.clock import SystemClock
-from swarm.runtime.table import Column
+from sim.bench.route_solvers import METHODS
+from swarm.runtime.table import Column, ResultTable
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +23,7 @@ class FoundRoutes:
 
     file: str
     family: str
+    method: str
     best_known: float
     value: float
     """The published objective, reckoned anew from the routes."""
@@ -32,16 +31,18 @@ class FoundRoutes:
     """Over the best known; less than 0 if better."""
     seconds: float
     """Until the best was found."""
-    seed: int
+    seed: int | None
+    """None where the method has none."""
     routes: list[list[int]]
     """Nodes from 1 in the order of the file, without the depot, one list per UAV."""
 
 
 @dataclass(frozen=True, slots=True)
 class InstanceRow:
-    """All searches of one instance, as a line of the table."""
+    """All searches of one instance by one method, as a line of the table."""
 
     file: str
+    method: str
     tasks: int
     uavs: int
     best_known: float
@@ -69,60 +70,69 @@ class RoutesBench(BenchResult):
         }
 
     def parts(self) -> Iterable[RenderableType]:
-        """A table, and the mean gap of each family."""
-        seeds = sorted({found.seed for found in self.found})
-        yield (
-            f"{self.time_limit_s:g} s each; seeds {', '.join(map(str, seeds))}; gaps in the "
-            "published objective [%], below 0: better than the best known"
-        )
-        yield table_of(
+        """A table, the mean gap of each family, and what the methods are."""
+        yield self._about()
+        yield self.grid()
+        yield from self._notes()
+
+    def as_markdown(self) -> str:
+        """Everything for a document."""
+        about = f"Measured on {self.machine}. {self._about()}"
+        return "\n\n".join([about, self.grid().as_markdown(), *self._notes()]) + "\n"
+
+    def grid(self) -> ResultTable:
+        """A line per instance and method."""
+        several = len({row.method for row in self.rows}) > 1
+        return table_of(
             self.rows,
             Column("instance", key="file", words=True),
+            *([Column("method", key="method", words=True)] if several else []),
             Column("tasks", "d", key="tasks"),
             Column("UAVs", "d", key="uavs"),
-            Column("best known", ".0f", key="best_known"),
+            *([] if several else [Column("best known", ".0f", key="best_known")]),
             Column("found", ".0f", key="best"),
-            Column("mean gap", ".3f", "%", 0.01, "mean_gap"),
-            Column("least", ".3f", "%", 0.01, "best_gap"),
-            Column("found after", ".1f", "s", key="seconds"),
+            Column("mean gap", ".3f", "%", 100.0, "mean_gap"),
+            Column("least", ".3f", "%", 100.0, "best_gap"),
+            Column("after", ".1f", "s", key="seconds"),
         )
-        for family in dict.fromkeys(found.family for found in self.found):
-            gaps = [found.gap for found in self.found if found.family == family]
-            yield f"{family}: mean gap {100.0 * fmean(gaps):.3f} % of {len(gaps)} searches"
+
+    def _about(self) -> str:
+        seeds = dict.fromkeys(found.seed for found in self.found if found.seed is not None)
+        seeded = f" seeds {', '.join(map(str, seeds))};" if seeds else ""
+        return (
+            f"{self.time_limit_s:g} s each;{seeded} gaps in the published objective, below 0: "
+            "better than the best known."
+        )
+
+    def _notes(self) -> Iterable[str]:
+        for family, method in dict.fromkeys((found.family, found.method) for found in self.found):
+            gaps = [
+                found.gap
+                for found in self.found
+                if (found.family, found.method) == (family, method)
+            ]
+            mean = f"mean gap {100.0 * fmean(gaps):.3f} % of {len(gaps)} searches"
+            yield f"{family}, {method}: {mean}"
+        methods = dict.fromkeys(found.method for found in self.found)
+        yield "; ".join(f"{name}: {METHODS[name].what}" for name in methods) + "."
 
 
-def search_instance(instance: Instance, seed: int, limit_s: float) -> FoundRoutes:
-    """Search as `swarm plan` does, with the instance's own distances, for ``limit_s`` seconds."""
-    clock = SystemClock()
-    began_s = clock.now_s()
-    seconds, best = 0.0, float("-inf")
-
-    def spent_frac(_: int) -> float:
-        return (clock.now_s() - began_s) / limit_s
-
-    def progress(_: int, value: float) -> None:
-        nonlocal seconds, best
-        if value > best:
-            seconds, best = clock.now_s() - began_s, value
-
-    lists, _ = optimise_routes(
-        team_at_start(instance.problem()),
-        seed=seed,
-        spent_frac=spent_frac,
-        progress=progress,
-        given=instance.given_times(),
-    )
-    routes = [[task + 2 for task in tasks] for tasks in lists]
-    value = instance.value(routes)
+def search_instance(
+    instance: Instance, seed: int | None, limit_s: float, method: str = "guided"
+) -> FoundRoutes:
+    """Search with one method of `METHODS` for ``limit_s`` seconds."""
+    found = METHODS[method].solve(instance, seed or 0, limit_s)
+    value = instance.value(found.routes)
     return FoundRoutes(
         file=instance.file,
         family=str(instance.family),
+        method=method,
         best_known=instance.best_known,
         value=value,
         gap=instance.gap(value),
-        seconds=seconds,
+        seconds=found.seconds,
         seed=seed,
-        routes=routes,
+        routes=found.routes,
     )
 
 
@@ -130,24 +140,36 @@ def measure_routes(
     instances: Sequence[Instance],
     seeds: Sequence[int],
     limit_s: float,
+    methods: Sequence[str] = ("guided",),
     *,
     tell: Progress = unheard,
 ) -> RoutesBench:
-    """Search each instance with each seed, one after another."""
+    """Search each instance with each method and seed, one after another.
+
+    Methods without seeds search once; those that cannot state an instance's objective are left
+    out of it.
+    """
     found = []
     for number, instance in enumerate(instances, start=1):
-        for seed in seeds:
-            tell(f"{instance.file} ({number} of {len(instances)}), seed {seed}")
-            found.append(search_instance(instance, seed, limit_s))
+        for name in methods:
+            method = METHODS[name]
+            if instance.family not in method.families:
+                continue
+            for seed in seeds if method.seeded else (None,):
+                tell(f"{instance.file} ({number} of {len(instances)}), {name}, seed {seed}")
+                found.append(search_instance(instance, seed, limit_s, name))
     return RoutesBench(this_machine(), limit_s, tuple(_rows(instances, found)), tuple(found))
 
 
 def _rows(instances: Sequence[Instance], found: Sequence[FoundRoutes]) -> Iterable[InstanceRow]:
-    for instance, (_, group) in zip(instances, groupby(found, lambda one: one.file), strict=True):
+    by_file = {instance.file: instance for instance in instances}
+    for (file, method), group in groupby(found, lambda one: (one.file, one.method)):
         runs = list(group)
+        instance = by_file[file]
         best = min(runs, key=lambda run: run.gap)
         yield InstanceRow(
-            file=instance.file,
+            file=file,
+            method=method,
             tasks=instance.n_task,
             uavs=instance.n_uav,
             best_known=instance.best_known,

@@ -3,8 +3,10 @@
 Large-neighbourhood search with annealing (slack induction by string removals, Christiaens and
 Vanden Berghe 2020, doi:10.1287/trsc.2019.0914) and local search, on segments joined in O(1)
 (Silva et al. 2012, doi:10.1016/j.ejor.2012.03.044; Vidal et al. 2014,
-doi:10.1016/j.ejor.2013.09.045). What segments are worth is defined plainly in
-`tests.support.reference`.
+doi:10.1016/j.ejor.2013.09.045). Where nobody is expected to be lost and more than 80 tasks come on
+a UAV: iterated local search by moves between near tasks (granular neighbourhoods, Toth and Vigo
+2003, doi:10.1287/ijoc.15.4.333.24890), shaken by double bridges (Silva et al. 2012) or ruins. What
+segments are worth is defined plainly in `tests.support.reference`.
 """
 
 from __future__ import annotations
@@ -148,8 +150,7 @@ def optimise_routes(
         given: times that do not follow from places; only where nobody is lost.
 
     Returns:
-        Lists per UAV, and Σ p·S·m·(D − t) over them [value·s]; with given due times, Σ
-        p·S·m·(due − t) over lists that leave out what is not worth it.
+        Lists per UAV, and Σ p·S·m·(D − t) over them [value·s]; due - t with given due times.
 
     Raises:
         ValueError: names the argument that is wrong.
@@ -162,14 +163,13 @@ def optimise_routes(
         raise ValueError(f"seed must be within 0..2**64 - 1, not {seed}")
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be >= 1, not {threads}")
-    kernel_threads = (os.cpu_count() or 1) if threads is None else threads
     search = _kernels.RouteSearch(
         team.problem,
         *team.arguments(),
         *open_lists(team, lists),
         np.asarray(team.open),
         seed,
-        *((None,) * 3 if given is None else given.arguments(team)),
+        *(given.arguments(team) if given else ()),
     )
 
     def time_spent_frac() -> float:
@@ -191,7 +191,7 @@ def optimise_routes(
         now = max(_FEWEST_IN_SLICE, min(most, int(total / lanes / _SLICES)))
         if iterations is not None:
             now = min(now, -(-(iterations - done) // lanes))
-        search.round(now, _heat(max(0.0, spent), total, full), kernel_threads)
+        search.round(now, _heat(max(0.0, spent), total, full), threads or os.cpu_count() or 1)
         done += now * lanes
         if progress is not None:
             progress(done, search.best_value())

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from sim.bench.instances import Family, read_instances
-from sim.bench.routes import measure_routes
+from sim.bench.route_solvers import METHODS
+from sim.bench.routes import measure_routes, search_instance
 from swarm.cli import main
 from swarm.runtime.errors import InputError
 
@@ -92,6 +93,40 @@ def test_what_is_found_is_optimal_and_can_be_recomputed(tmp_path: Path) -> None:
     assert {"file", "best_known", "value", "gap", "seconds", "seed", "routes"} <= told[0].keys()
 
 
+@pytest.mark.parametrize("method", [name for name, each in METHODS.items() if each.module])
+def test_others_do_all_tasks_of_a_repairman_once(tmp_path: Path, method: str) -> None:
+    if not METHODS[method].is_installed():
+        pytest.skip(f"{method} has no wheel here")
+    instance = read_instances(published(tmp_path))[1]
+
+    found = search_instance(instance, None, 1.0, method)
+
+    assert sorted(itertools.chain(*found.routes)) == [2, 3, 4]
+    assert found.value == instance.value(found.routes) == 6.0
+    assert (found.method, found.seed) == (method, None)
+
+
+def test_or_tools_weighs_profits_against_arrivals(tmp_path: Path) -> None:
+    instance = read_instances(published(tmp_path))[0]
+
+    assert search_instance(instance, None, 0.2, "ortools").value == 23.0
+
+
+def test_methods_stand_side_by_side_but_for_what_they_cannot_state(tmp_path: Path) -> None:
+    published(tmp_path)
+    plot, out = tmp_path / "gaps.svg", tmp_path / "gaps.md"
+    arguments = ["bench", "routes", "--instances", str(tmp_path), "--time-limit-s", "0.1"]
+    arguments += ["--seeds", "0,1", "--methods", "guided,ortools"]
+
+    assert main([*arguments, "--plot", str(plot), "--out", str(out)], commands=COMMANDS) == 0
+
+    shown = out.read_text()
+    assert "trp, guided: mean gap 0.000 % of 2 searches" in shown
+    assert "trp, ortools: mean gap 0.000 % of 1 searches" in shown
+    assert "| profits_2.txt | ortools | 3 | 2 | 23 | 2.128 | 2.128 |" in shown
+    assert plot.stat().st_size > 1000
+
+
 def test_files_are_chosen_by_name(tmp_path: Path) -> None:
     at = published(tmp_path)
 
@@ -162,8 +197,8 @@ def test_the_command_shows_a_table_or_routes(
     told = json.loads(capsys.readouterr().out)
 
     assert "0.05 s each; seeds 0, 1" in shown
-    assert "trp: mean gap 0.000 % of 2 searches" in shown
-    assert "mtrpp: mean gap 2.128 % of 2 searches" in shown
+    assert "trp, guided: mean gap 0.000 % of 2 searches" in shown
+    assert "mtrpp, guided: mean gap 2.128 % of 2 searches" in shown
     (found,) = told["instances"]
     assert (found["file"], found["value"], found["gap"], found["seed"]) == ("square.tsp", 6, 0, 2)
     assert sorted(found["routes"][0]) == [2, 3, 4]
