@@ -10,6 +10,7 @@ from sim.bench.route_solvers import METHODS
 from sim.bench.routes import RoutesBench
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.figure import Figure
 
 _COLOURS = ("#0072B2", "#D55E00", "#009E73")
@@ -23,7 +24,7 @@ def gaps_figure(bench: RoutesBench) -> Figure:
     """Mean gaps as marks, from the least to the greatest as lines, instances by size."""
     from matplotlib.figure import Figure
 
-    gaps = defaultdict(list)
+    gaps: defaultdict[tuple[str, str], list[float]] = defaultdict(list)
     for found in bench.found:
         gaps[found.file, found.method].append(found.gap)
     families = list(dict.fromkeys(found.family for found in bench.found))
@@ -69,7 +70,7 @@ def gaps_figure(bench: RoutesBench) -> Figure:
             )
         else:
             axes.set_xlabel(f"{len(order)} instances, by number of tasks")
-    entries = {}
+    entries: dict[str, Artist] = {}
     for axes in figure.axes:
         handles, labels = axes.get_legend_handles_labels()
         entries.update(zip(labels, handles, strict=True))
