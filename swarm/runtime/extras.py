@@ -27,7 +27,7 @@ EXTRAS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
             "zstandard",
         ),
         "study": ("distributed", "pyarrow"),
-        "bench": ("ortools",),
+        "bench": ("ortools", "vrp_cli"),
     }
 )
 """Modules that are imported where they are needed, by the extra that brings them."""
