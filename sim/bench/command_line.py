@@ -90,7 +90,7 @@ def limit_of(flag: str, word: str) -> float:
     return limit_s
 
 
-def check_files(plot: Path | None, out: Path | None) -> None:
+def check_files(plot: Path | None, out: Path | None, new_best: Path | None = None) -> None:
     """Refuse what cannot be written before anything is measured.
 
     Raises:
@@ -102,7 +102,7 @@ def check_files(plot: Path | None, out: Path | None) -> None:
     if plot is not None and plot.suffix.lower() not in PLOT_SUFFIXES:
         remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"
         faults.append(Fault("--plot", str(plot), "no picture has this suffix", remedy))
-    for flag, path in (("--plot", plot), ("--out", out)):
+    for flag, path in (("--plot", plot), ("--out", out), ("--new-best", new_best)):
         if path is not None and not path.absolute().parent.is_dir():
             faults.append(Fault(flag, str(path), "its folder is not there", "make it first"))
     if faults:

@@ -8,7 +8,7 @@ tasks and of UAVs, each line after it x, y and profit, first of the depot; dista
 halves up; what is not worth its arrival is left out.
 
 A file `*.csv` with the columns `file` and `best_known` says which files of its folder, or of
-folders in it, are instances.
+folders in it, are instances. Where it has a column `upper_bound`, no profit is above that.
 """
 
 from __future__ import annotations
@@ -57,6 +57,8 @@ class Instance:
     place: FloatArray
     """(n_node, 2)."""
     best_known: float
+    upper_bound: float | None = None
+    """Published for `Family.MTRPP`: nobody finds a larger value."""
 
     @property
     def n_task(self) -> int:
@@ -121,7 +123,7 @@ def read_instances(folder: Path, only: str | None = None) -> list[Instance]:
         problem = "no table *.csv of instances in it or below"
         raise InputError(Fault("--instances", str(folder), problem, "add one: file,best_known"))
     patterns = ["*"] if only is None else [word.strip() for word in only.split(",")]
-    names = [path.name for path, _ in named]
+    names = [path.name for path, *_ in named]
     for pattern in patterns:
         if not fnmatch.filter(names, pattern):
             alike = difflib.get_close_matches(pattern, names) or names[:3]
@@ -129,11 +131,11 @@ def read_instances(folder: Path, only: str | None = None) -> list[Instance]:
                 Fault("--only", pattern, "names no instance", f"name some, as {', '.join(alike)}")
             )
     chosen = [any(fnmatch.fnmatchcase(name, each) for each in patterns) for name in names]
-    return [_read(path, best) for path, best in itertools.compress(named, chosen)]
+    return [_read(*row) for row in itertools.compress(named, chosen)]
 
 
-def _named(folder: Path) -> Iterator[tuple[Path, float]]:
-    """Instances and their best known values."""
+def _named(folder: Path) -> Iterator[tuple[Path, float, float | None]]:
+    """Instances, their best known values and the upper bounds on these."""
     for table in sorted(folder.rglob("*.csv")):
         for line, row in enumerate(csv.DictReader(_text(table).splitlines()), start=2):
             name, best = row.get("file"), row.get("best_known")
@@ -141,14 +143,17 @@ def _named(folder: Path) -> Iterator[tuple[Path, float]]:
                 raise _fault(table, 1, "no columns file and best_known", "begin with their names")
             if not _is_number(best):
                 raise _fault(table, line, f"best_known is {best!r}", "give a number")
+            bound = row.get("upper_bound") or ""
+            if bound and not _is_number(bound):
+                raise _fault(table, line, f"upper_bound is {bound!r}", "give a number or nothing")
             usable = name and not Path(name).is_absolute()
             paths = sorted(table.parent.rglob(name)) if usable else []
             if not paths:
                 raise _fault(table, line, f"no file {name!r} here or below", "name one that is")
-            yield paths[0], float(best)
+            yield paths[0], float(best), float(bound) if bound else None
 
 
-def _read(path: Path, best_known: float) -> Instance:
+def _read(path: Path, best_known: float, upper_bound: float | None) -> Instance:
     if path.suffix == ".tsp":
         place, distance = _read_tsplib(path)
         profit = np.zeros(len(place))
@@ -164,7 +169,9 @@ def _read(path: Path, best_known: float) -> Instance:
     table = np.array([_numbers(path, line, words, 3) for line, words in lines[1:]])
     place, profit = table[:, :2].copy(), table[:, 2].copy()
     distance = np.floor(_straight(place) + 0.5)
-    return Instance(path.name, Family.MTRPP, n_uav, distance, profit, place, best_known)
+    return Instance(
+        path.name, Family.MTRPP, n_uav, distance, profit, place, best_known, upper_bound
+    )
 
 
 def _read_tsplib(path: Path) -> tuple[FloatArray, FloatArray]:

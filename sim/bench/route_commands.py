@@ -42,6 +42,15 @@ def routes(
         typer.Option("--methods", metavar="NAME,…", help="Among guided, ortools and vrp-cli."),
     ] = "guided",
     json: JsonOption = False,
+    new_best: Annotated[
+        Path | None,
+        typer.Option(
+            "--new-best",
+            metavar="FILE.json",
+            help="Also write routes that are better than the best known.",
+            show_default=False,
+        ),
+    ] = None,
     plot: Annotated[
         Path | None,
         typer.Option(
@@ -74,6 +83,8 @@ def routes(
         swarm bench routes --instances benchmarks --only '*.tsp' --methods guided,ortools,vrp-cli
         swarm bench routes --instances benchmarks --json
     """
+    from json import dumps
+
     from sim.bench.instances import read_instances
     from sim.bench.plan_report import write_figure
     from sim.bench.route_figure import gaps_figure
@@ -82,7 +93,7 @@ def routes(
     limit_s = limit_of("--time-limit-s", time_limit_s)
     all_seeds = each("--seeds", seeds, SEED)
     names = each("--methods", methods, _method)
-    check_files(plot, out)
+    check_files(plot, out, new_best)
     found = read_instances(instances, only)
     with progress() as tell:
         done = measure_routes(found, all_seeds, limit_s, names, tell=tell)
@@ -90,6 +101,9 @@ def routes(
         write_file("--plot", plot, lambda path: write_figure(gaps_figure(done), path))
     if out is not None:
         write_file("--out", out, lambda path: path.write_text(done.as_markdown(), "utf-8"))
+    if new_best is not None:
+        routes_json = dumps(done.new_best(), indent=1) + "\n"
+        write_file("--new-best", new_best, lambda path: path.write_text(routes_json, "utf-8"))
     show(done, json=json)
     return 0
 

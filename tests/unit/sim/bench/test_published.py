@@ -112,6 +112,53 @@ def test_or_tools_weighs_profits_against_arrivals(tmp_path: Path) -> None:
     assert search_instance(instance, None, 0.2, "ortools").value == 23.0
 
 
+def test_what_a_published_bound_proves_ends_the_search(tmp_path: Path) -> None:
+    published(tmp_path)
+    (tmp_path / "mtrpp" / "profits.csv").write_text(
+        "file,upper_bound,best_known\nprofits_2.txt,23,20\n"
+    )
+    instance = read_instances(tmp_path, "profits_2.txt")[0]
+
+    found = search_instance(instance, 0, 600.0)  # the suite would notice ten minutes
+
+    assert instance.upper_bound == 23.0
+    assert (found.value, found.gap) == (23.0, -0.15)
+
+
+def test_new_best_values_are_told_with_their_routes(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    published(tmp_path)
+    (tmp_path / "mtrpp" / "profits.csv").write_text("file,best_known\nprofits_2.txt,20\n")
+    told = tmp_path / "new.json"
+    arguments = ["bench", "routes", "--instances", str(tmp_path), "--time-limit-s", "0.05"]
+
+    assert main([*arguments, "--seeds", "0,1", "--new-best", str(told)], commands=COMMANDS) == 0
+
+    (found,) = json.loads(told.read_text())  # square.tsp is only as good as the best known
+    assert (found["file"], found["value"], found["best_known"]) == ("profits_2.txt", 23.0, 20.0)
+    assert sorted(itertools.chain(*found["routes"])) == [2, 3]
+    shown = " ".join(capsys.readouterr().out.split())
+    assert "better than the best known: profits_2.txt 23 (known: 20)" in shown
+
+
+def test_many_instances_have_a_row_per_size(tmp_path: Path) -> None:
+    names = [f"square-{k}.tsp" for k in range(41)]
+    for name in names:
+        (tmp_path / name).write_text(SQUARE)
+    best = [f"{name},{7 if k == 0 else 6}" for k, name in enumerate(names)]
+    (tmp_path / "best.csv").write_text("\n".join(["file,best_known", *best]))
+
+    done = measure_routes(read_instances(tmp_path), [0], 0.01)
+
+    (row,) = done.grid().cells()
+    assert row[:4] == ["trp", "3", "1", "41"]
+    assert row[6:8] == ["100", "1"]  # all reach the best known, one surpasses it
+    (size,) = done.sizes()
+    assert (size.searches, size.worst_gap) == (41, 0.0)
+    assert size.mean_gap == pytest.approx(-1 / 7 / 41)
+
+
 def test_methods_stand_side_by_side_but_for_what_they_cannot_state(tmp_path: Path) -> None:
     published(tmp_path)
     plot, out = tmp_path / "gaps.svg", tmp_path / "gaps.md"
@@ -173,6 +220,7 @@ def test_instances_that_cannot_be_read_are_refused(
         ("file,best_known\nb.tsp,1\n", "best.csv: line 2: no file 'b.tsp' here or below"),
         ("file,best_known\n../../b.tsp,1\n", "best.csv: line 2: no file '../../b.tsp'"),
         ("file,best_known\n/a.tsp,1\n", "best.csv: line 2: no file '/a.tsp' here or below"),
+        ("file,best_known,upper_bound\na.tsp,1,x\n", "line 2: upper_bound is 'x'; give a number"),
         ("file,best_known\n", "no table *.csv of instances in it or below"),
     ],
 )
@@ -196,7 +244,7 @@ def test_the_command_shows_a_table_or_routes(
     assert main([*arguments, "--only", "*.tsp", "--seeds", "2", "--json"], commands=COMMANDS) == 0
     told = json.loads(capsys.readouterr().out)
 
-    assert "0.05 s each; seeds 0, 1" in shown
+    assert "seeds 0, 1; gaps in the published objective" in " ".join(shown.split())
     assert "trp, guided: mean gap 0.000 % of 2 searches" in shown
     assert "mtrpp, guided: mean gap 2.128 % of 2 searches" in shown
     (found,) = told["instances"]
