@@ -11,6 +11,7 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "nearest.hpp"
 #include "rules.hpp"
 
 namespace peckorder {
@@ -128,26 +129,14 @@ void Problem::turn_table() const {
 
 void Problem::find_near() const {
     n_near_ = std::max(0, std::min(kMostNear, n_task_ - 1));
-    const bool in_table = n_task_ <= kMostInTable;
-    std::vector<double> row(n_task_), between_m;
-    std::vector<std::int32_t> order(n_task_);
-    if (in_table) between_m.reserve(static_cast<std::size_t>(n_task_) * n_task_);
-    near_.clear();
-    near_.reserve(static_cast<std::size_t>(n_task_) * n_near_);
+    near_ = nearest(task_m_.data(), n_task_, n_near_);
+    between_m_.clear();
+    if (n_task_ > kMostInTable) return;
+    between_m_.reserve(static_cast<std::size_t>(n_task_) * n_task_);
     for (int task = 0; task < n_task_; ++task) {
-        for (int to = 0; to < n_task_; ++to) row[to] = straight_m(place_m(task), place_m(to));
-        if (in_table) between_m.insert(between_m.end(), row.begin(), row.end());
-        std::iota(order.begin(), order.end(), 0);
-        order.erase(order.begin() + task);
-        const auto nearer = [&](int a, int b) {
-            return row[a] < row[b] || (row[a] == row[b] && a < b);
-        };
-        std::nth_element(order.begin(), order.begin() + n_near_, order.end(), nearer);
-        std::sort(order.begin(), order.begin() + n_near_, nearer);
-        near_.insert(near_.end(), order.begin(), order.begin() + n_near_);
-        order.resize(n_task_);
+        for (int to = 0; to < n_task_; ++to)
+            between_m_.push_back(straight_m(place_m(task), place_m(to)));
     }
-    between_m_ = std::move(between_m);
 }
 
 std::unique_ptr<Workspace> Problem::borrow_workspace() const {

@@ -143,8 +143,11 @@ class Problem {
     // From completing each of these tasks to completing each other, n * n.
     std::vector<double> legs_s(int uav, const std::vector<int>& tasks) const;
 
+    double quick_travel_s(int uav, const double* from_m, const double* to_m) const {
+        return quickly_s(uav, straight_m(from_m, to_m));
+    }
     double quick_travel_s(int uav, const double* from_m, int task) const {
-        return quickly_s(uav, straight_m(from_m, place_m(task)));
+        return quick_travel_s(uav, from_m, place_m(task));
     }
     double quick_travel_s(int uav, int from, int to) const {
         return quickly_s(uav, between_m(from, to));

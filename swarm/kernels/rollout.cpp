@@ -87,8 +87,9 @@ void reconsider(Solution& solution, int uav, long iterations) {
   search.load(solution.routes(), uavs);
   const double hottest = kHeat * solution.mean_delay();
   constexpr int kSteps = 10;
+  Watch never;
   for (int step = 0; step < kSteps; ++step)
-    search.run(iterations / kSteps, hottest * (kSteps - step) / kSteps);
+    search.run(iterations / kSteps, hottest * (kSteps - step) / kSteps, never);
   for (const int other : uavs) solution.set_route(other, search.best_route(other));
   improve(solution, uavs);
 }

@@ -39,9 +39,9 @@ class BoundSearch {
         team_(problem, start_, lists.routes(), open_tasks(open), seed,
               given_ ? &*given_ : nullptr) {}
 
-  void round(long iterations, double heat, int threads) {
-    const nb::gil_scoped_release released;
-    team_.round(iterations, heat, threads);
+  void round(long iterations, double heat, int threads, nb::handle should_stop) {
+    PythonWatch(should_stop).released(
+        [&](Watch& watch) { team_.round(iterations, heat, threads, watch); });
   }
 
   void polish(nb::handle should_stop) {
@@ -97,7 +97,7 @@ void bind_routes(nb::module_& module) {
           nb::arg("open"), nb::arg("seed"), nb::arg("given_first_s") = nb::none(),
           nb::arg("given_leg_s") = nb::none(), nb::arg("given_due_s") = nb::none())
       .def("round", &BoundSearch::round, nb::arg("iterations"), nb::arg("heat"),
-           nb::arg("threads"))
+           nb::arg("threads"), nb::arg("should_stop") = nb::none())
       .def("polish", &BoundSearch::polish, nb::arg("should_stop") = nb::none())
       .def("n_lane", &BoundSearch::n_lane)
       .def("most_iterations", &BoundSearch::most_iterations)

@@ -175,6 +175,7 @@ def optimise_routes(
     def time_spent_frac() -> float:
         return 0.0 if spent_frac is None else float(spent_frac(0))
 
+    ends = None if spent_frac is None else lambda: not time_spent_frac() < 1.0 - _LAST_POLISH_FRAC
     search.polish(lambda: not time_spent_frac() < _FIRST_POLISH_FRAC)
     lanes = search.n_lane()
     full = int(np.sum(team.open)) * search.iterations_for_full_heat()
@@ -191,7 +192,8 @@ def optimise_routes(
         now = max(_FEWEST_IN_SLICE, min(most, int(total / lanes / _SLICES)))
         if iterations is not None:
             now = min(now, -(-(iterations - done) // lanes))
-        search.round(now, _heat(max(0.0, spent), total, full), threads or os.cpu_count() or 1)
+        heat = _heat(max(0.0, spent), total, full)
+        search.round(now, heat, threads or os.cpu_count() or 1, ends)
         done += now * lanes
         if progress is not None:
             progress(done, search.best_value())

@@ -12,6 +12,7 @@ constexpr int kLongestBridged = 50;
 constexpr int kMostTorn = 10;
 constexpr int kMostStrings = 3;
 constexpr int kNearToPutBack = 10;
+constexpr int kSteps = 3000;  // of a watch, for an iteration
 }  // namespace
 
 GranularSearch::GranularSearch(const RouteTerms& terms, std::uint64_t seed)
@@ -214,10 +215,11 @@ void GranularSearch::save_best() {
   unsaved_.clear();
 }
 
-void GranularSearch::run(long iterations, double temperature) {
+void GranularSearch::run(long iterations, double temperature, Watch& watch) {
   if (tasks_.empty()) return;
   double value = lists_.total();
   for (long iteration = 0; iteration < iterations; ++iteration) {
+    if (watch.stops_after(kSteps)) return;
     if (random_.uniform() < kRuinFrac)
       ruin();
     else

@@ -18,7 +18,7 @@ class GranularSearch : public Lane {
   GranularSearch(const RouteTerms& terms, std::uint64_t seed);
 
   void load(const std::vector<Route>& routes, const std::vector<int>& uavs) override;
-  void run(long iterations, double temperature) override;
+  void run(long iterations, double temperature, Watch& watch) override;
 
   const std::vector<int>& uavs() const override { return uavs_; }
   double best_value() const override { return best_value_; }

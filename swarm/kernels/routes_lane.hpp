@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "routes_solution.hpp"
+#include "watch.hpp"
 
 namespace peckorder {
 
@@ -14,7 +15,8 @@ class Lane {
   // Work on the lists of these UAVs alone; best := current.
   virtual void load(const std::vector<Route>& routes, const std::vector<int>& uavs) = 0;
 
-  virtual void run(long iterations, double temperature) = 0;
+  // Fewer if the watch stops it.
+  virtual void run(long iterations, double temperature, Watch& watch) = 0;
 
   virtual const std::vector<int>& uavs() const = 0;
   virtual double best_value() const = 0;  // Σ over those UAVs' lists

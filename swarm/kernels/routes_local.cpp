@@ -298,7 +298,7 @@ double worth_from(const Solution& solution, int uav, int place, const Segment& m
   if (middle.empty()) {
     if (ends) return 0.0;
     const double delay_s =
-        solution.reach_s(uav, place, route[next]) - solution.completion_s(route[next]);
+        solution.reach_s(uav, place, route[next]) - solution.completion_s(uav, next);
     return survived * (solution.tail_worth(uav, next) - delay_s * solution.tail_slope(uav, next));
   }
   const double begin_s = solution.reach_s(uav, place, middle.first);
@@ -306,7 +306,7 @@ double worth_from(const Solution& solution, int uav, int place, const Segment& m
   if (!ends) {
     const double delay_s = begin_s + middle.duration_s +
                            solution.problem().leg_s(uav, middle.last, route[next]) -
-                           solution.completion_s(route[next]);
+                           solution.completion_s(uav, next);
     worth += middle.survival *
              (solution.tail_worth(uav, next) - delay_s * solution.tail_slope(uav, next));
   }

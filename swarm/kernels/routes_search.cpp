@@ -9,7 +9,8 @@ constexpr double kMeanTorn = 15.0;
 constexpr double kLongestString = 10.0;
 constexpr double kSplitShare = 0.5;
 constexpr double kSplitDepth = 0.01;
-constexpr std::uint64_t kBlink = 0x028F5C28F5C28F5Cull;  // 1 % of 2^64
+constexpr int kSteps = 1000;  // of a watch, for an iteration
+constexpr double kMeanToBlink = 99.5;  // places between two that are overlooked; 1 %
 }  // namespace
 
 void insert_missing(Solution& solution, const std::vector<int>& tasks) {
@@ -42,10 +43,11 @@ void Search::load(const std::vector<Route>& routes, const std::vector<int>& uavs
   tasks_.clear();
   for (const int uav : unsaved_) is_unsaved_[uav] = 0;
   unsaved_.clear();
+  for (const int uav : uavs) tasks_.insert(tasks_.end(), routes[uav].begin(), routes[uav].end());
+  current_.gather(tasks_);
   for (const int uav : uavs) {
     current_.set_route(uav, routes[uav]);
     best_[uav] = routes[uav];
-    tasks_.insert(tasks_.end(), routes[uav].begin(), routes[uav].end());
   }
   std::sort(tasks_.begin(), tasks_.end());
   best_value_ = current_.total();
@@ -54,9 +56,16 @@ void Search::load(const std::vector<Route>& routes, const std::vector<int>& uavs
 void Search::keep_copy(int uav) {
   if (is_touched_[uav]) return;
   is_touched_[uav] = 1;
-  copies_[touched_.size()] = current_.route(uav);
+  current_.copy(uav, copies_[touched_.size()]);
   touched_.push_back(uav);
   value_before_ += current_.route_value(uav);
+}
+
+// One place in a hundred, independently of each other: gaps between them are drawn.
+bool Search::blinks() {
+  if (--until_blink_ > 0) return false;
+  until_blink_ = 1 + static_cast<int>(kMeanToBlink * random_.exponential());
+  return true;
 }
 
 void Search::ruin() {
@@ -94,7 +103,8 @@ void Search::tear(int task, double longest) {
   keep_copy(uav);
   const Route& route = current_.route(uav);
   for (int k = 0; k < span; ++k)
-    if (k < gap || k >= gap + kept) torn_.push_back(route[begin + k]);
+    if (k < gap || k >= gap + kept)
+      torn_.push_back({route[begin + k], current_.completion_s(uav, begin + k)});
   if (span > gap + kept) current_.remove(uav, begin + gap + kept, span - gap - kept);
   current_.remove(uav, begin, std::min(gap, length));
 }
@@ -103,31 +113,31 @@ void Search::recreate() {
   const Problem& problem = current_.problem();
   const int kind = random_.below(10);
   order_.clear();
-  for (const int task : torn_) {
+  for (const auto& [task, completion_s] : torn_) {
     double key;
     if (kind < 4) {
       key = random_.uniform();
     } else if (kind < 8) {
       key = -problem.value(task);
     } else {
-      key = current_.completion_s(task) * (kind == 8 ? 1.0 : -1.0);
+      key = completion_s * (kind == 8 ? 1.0 : -1.0);
     }
     order_.emplace_back(key, task);
   }
   std::sort(order_.begin(), order_.end());
   for (const auto& [key, task] : order_) {
-    Insertion best =
-        best_insertion(current_, task, [this] { return random_.bits() < kBlink; });
+    Insertion best = best_insertion(current_, task, [this] { return blinks(); });
     if (best.uav < 0) best = best_insertion(current_, task);
     keep_copy(best.uav);
     current_.insert(best.uav, best.place, task);
   }
 }
 
-void Search::run(long iterations, double temperature) {
+void Search::run(long iterations, double temperature, Watch& watch) {
   if (tasks_.empty()) return;
   double value = current_.total();
   for (long iteration = 0; iteration < iterations; ++iteration) {
+    if (watch.stops_after(kSteps)) return;
     value_before_ = 0.0;
     ruin();
     recreate();
@@ -138,7 +148,7 @@ void Search::run(long iterations, double temperature) {
       const int uav = touched_[k];
       is_touched_[uav] = 0;
       if (!accepted) {
-        current_.set_route(uav, copies_[k]);
+        current_.restore(uav, copies_[k]);
       } else if (!is_unsaved_[uav]) {
         is_unsaved_[uav] = 1;
         unsaved_.push_back(uav);

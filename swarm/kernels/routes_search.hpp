@@ -25,7 +25,7 @@ class Search : public Lane {
   // Work on the lists of these UAVs alone; best := current.
   void load(const std::vector<Route>& routes, const std::vector<int>& uavs) override;
 
-  void run(long iterations, double temperature) override;
+  void run(long iterations, double temperature, Watch& watch) override;
 
   const std::vector<int>& uavs() const override { return current_.allowed(); }
   double best_value() const override { return best_value_; }
@@ -37,19 +37,25 @@ class Search : public Lane {
   void tear(int task, double longest);
   void recreate();
   void keep_copy(int uav);
+  bool blinks();
 
   Solution current_;
   Random random_;
+  int until_blink_ = 1;  // places looked at till the next that is overlooked
   double best_value_ = 0.0;
   std::vector<Route> best_;
   std::vector<int> tasks_;                     // all tasks on the lists
   std::vector<int> unsaved_;                   // UAVs whose lists changed since best_ was copied
   std::vector<std::uint8_t> is_unsaved_;
-  std::vector<int> torn_;                      // tasks taken out in this iteration
+  struct Torn {
+    int task;
+    double completion_s;  // where it was
+  };
+  std::vector<Torn> torn_;                     // tasks taken out in this iteration
   std::vector<std::pair<double, int>> order_;  // in which they are put back
   std::vector<int> touched_;                   // UAVs whose lists changed in this iteration
   std::vector<std::uint8_t> is_touched_;
-  std::vector<Route> copies_;                  // their lists before, in the order of touched_
+  std::vector<Solution::Copy> copies_;         // their lists before, in the order of touched_
   double value_before_ = 0.0;                  // Σ of their values before
 };
 

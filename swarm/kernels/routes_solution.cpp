@@ -1,5 +1,8 @@
 #include "routes_solution.hpp"
 
+#include <algorithm>
+#include <utility>
+
 namespace peckorder {
 
 Start::Start(const Problem& problem, const double* free, const double* place,
@@ -20,10 +23,11 @@ Solution::Solution(const Problem& problem, const Start& start)
     : problem_(&problem),
       start_(&start),
       routes_(problem.n_uav()),
-      value_(problem.n_uav(), 0.0),
-      visit_(problem.n_task()),
+      flights_(problem.n_uav()),
       uav_of_(problem.n_task(), -1),
       place_of_(problem.n_task(), 0),
+      column_of_(problem.n_uav(), 0),
+      row_of_(problem.n_task(), -1),
       is_allowed_(problem.n_uav(), 0) {
   std::vector<int> active;
   for (int uav = 0; uav < problem.n_uav(); ++uav)
@@ -32,62 +36,121 @@ Solution::Solution(const Problem& problem, const Start& start)
 }
 
 void Solution::restrict_to(const std::vector<int>& uavs) {
-  for (Route& route : routes_) {
-    for (const int task : route) uav_of_[task] = -1;
-    route.clear();
+  for (int uav = 0; uav < problem_->n_uav(); ++uav) {
+    for (const int task : routes_[uav]) uav_of_[task] = -1;
+    routes_[uav].clear();
+    flights_[uav].visits.clear();
+    flights_[uav].causes.clear();
+    flights_[uav].value = 0.0;
   }
-  value_.assign(value_.size(), 0.0);
   is_allowed_.assign(is_allowed_.size(), 0);
   allowed_ = uavs;
   for (const int uav : uavs) is_allowed_[uav] = 1;
+  if (!pairings_.empty()) row_of_.assign(row_of_.size(), -1);
+  pairings_.clear();
+}
+
+void Solution::gather(const std::vector<int>& tasks) {
+  for (std::size_t column = 0; column < allowed_.size(); ++column)
+    column_of_[allowed_[column]] = static_cast<int>(column);
+  pairings_.reserve(tasks.size() * allowed_.size());
+  for (std::size_t row = 0; row < tasks.size(); ++row) {
+    for (const int uav : allowed_) pairings_.push_back(worked_out(uav, tasks[row]));
+    row_of_[tasks[row]] = static_cast<int>(row);
+  }
 }
 
 void Solution::set_route(int uav, const Route& route) {
   for (const int task : routes_[uav])
     if (uav_of_[task] == uav) uav_of_[task] = -1;
   routes_[uav].assign(route.begin(), route.end());
+  Flight& flight = flights_[uav];
+  flight.visits.resize(route.size());
+  flight.causes.resize(route.size());
+  for (std::size_t k = 0; k < route.size(); ++k) put(uav, static_cast<int>(k), route[k]);
   refresh(uav, 0);
 }
 
 void Solution::insert(int uav, int place, int task) {
+  Flight& flight = flights_[uav];
   routes_[uav].insert(routes_[uav].begin() + place, task);
+  flight.visits.insert(flight.visits.begin() + place, Visit{});
+  flight.causes.insert(flight.causes.begin() + place, Cause{});
+  put(uav, place, task);
+  if (place + 1 < static_cast<int>(routes_[uav].size()))
+    flight.causes[place + 1].leg_s = way_s(uav, place + 1, routes_[uav][place + 1]);
   refresh(uav, place);
 }
 
 void Solution::remove(int uav, int place, int count) {
   Route& route = routes_[uav];
+  Flight& flight = flights_[uav];
   for (int k = place; k < place + count; ++k) uav_of_[route[k]] = -1;
-  route.erase(route.begin() + place, route.begin() + place + count);
+  const auto erase = [place, count](auto& of) {
+    of.erase(of.begin() + place, of.begin() + place + count);
+  };
+  erase(route);
+  erase(flight.visits);
+  erase(flight.causes);
+  if (place < static_cast<int>(route.size()))
+    flight.causes[place].leg_s = way_s(uav, place, route[place]);
   refresh(uav, place);
+}
+
+void Solution::copy(int uav, Copy& copy) const {
+  copy.route = routes_[uav];
+  copy.flight = flights_[uav];
+}
+
+void Solution::restore(int uav, Copy& copy) {
+  for (const int task : routes_[uav])
+    if (uav_of_[task] == uav) uav_of_[task] = -1;
+  std::swap(routes_[uav], copy.route);
+  std::swap(flights_[uav], copy.flight);
+  for (std::size_t k = 0; k < routes_[uav].size(); ++k) {
+    uav_of_[routes_[uav][k]] = uav;
+    place_of_[routes_[uav][k]] = static_cast<int>(k);
+  }
+}
+
+// Whatever of a visit does not depend on the tasks after it nor on the time before it.
+void Solution::put(int uav, int place, int task) {
+  Visit& visit = flights_[uav].visits[place];
+  std::copy_n(problem_->place_m(task), 3, visit.place_m);
+  visit.service_s = problem_->service_s(task);
+  const Pairing known = pairing(uav, task);
+  flights_[uav].causes[place] = {way_s(uav, place, task), known.weight, known.survival};
 }
 
 void Solution::refresh(int uav, int from_place) {
   const Route& route = routes_[uav];
+  Flight& flight = flights_[uav];
   const int size = static_cast<int>(route.size());
   const double horizon_s = problem_->horizon_s();
+  double now_s = ready_s(uav, from_place), survived = survived_before(uav, from_place);
   for (int k = from_place; k < size; ++k) {
-    const int task = route[k];
-    uav_of_[task] = uav;
-    place_of_[task] = k;
-    visit_[task].completion_s = reach_s(uav, k, task);
-    visit_[task].survived_after = survived_before(uav, k) * problem_->survival(uav, task);
+    uav_of_[route[k]] = uav;
+    place_of_[route[k]] = k;
+    now_s += flight.causes[k].leg_s;
+    survived *= flight.causes[k].survival;
+    flight.visits[k].completion_s = now_s;
+    flight.visits[k].survived_after = survived;
   }
   double slope = 0.0, worth = 0.0;
   for (int k = size - 1; k >= 0; --k) {
-    Visit& visit = visit_[route[k]];
-    const double weight = problem_->weight(uav, route[k]);
-    const double survival = problem_->survival(uav, route[k]);
-    slope = weight + survival * slope;
-    worth = weight * (horizon_s - visit.completion_s) + survival * worth;
+    Visit& visit = flight.visits[k];
+    const Cause& cause = flight.causes[k];
+    slope = cause.weight + cause.survival * slope;
+    worth = cause.weight * (horizon_s - visit.completion_s) + cause.survival * worth;
     visit.slope = slope;
     visit.worth = worth;
   }
-  value_[uav] = start_->survived[uav] * worth;
+  flight.value = start_->survived[uav] * worth;
 }
 
 double Solution::total() const {
   double sum = 0.0;
-  for (const int uav : allowed_) sum += value_[uav];
+  for (const int uav : allowed_) sum += flights_[uav].value;
   return sum;
 }
 
@@ -95,29 +158,39 @@ double Solution::mean_delay() const {
   double sum = 0.0;
   int count = 0;
   for (const int uav : allowed_) {
+    const Flight& flight = flights_[uav];
     double survived = start_->survived[uav];
-    for (const int task : routes_[uav]) {
-      sum += survived * problem_->weight(uav, task) *
-             (visit_[task].completion_s - start_->free_s[uav]);
-      survived = visit_[task].survived_after;
-      ++count;
+    for (std::size_t k = 0; k < flight.visits.size(); ++k, ++count) {
+      sum += survived * flight.causes[k].weight *
+             (flight.visits[k].completion_s - start_->free_s[uav]);
+      survived = flight.visits[k].survived_after;
     }
   }
   return count == 0 ? 0.0 : sum / count;
 }
 
-double Solution::insertion_gain(int uav, int place, int task) const {
-  const Route& route = routes_[uav];
-  const double completion_s = reach_s(uav, place, task);
-  double gain = problem_->weight(uav, task) * (problem_->horizon_s() - completion_s);
-  if (place < static_cast<int>(route.size())) {
-    const int next = route[place];
-    const Visit& visit = visit_[next];
-    const double delay_s =
-        completion_s + problem_->leg_s(uav, task, next) - visit.completion_s;
-    gain += problem_->survival(uav, task) * (visit.worth - delay_s * visit.slope) - visit.worth;
-  }
-  return survived_before(uav, place) * gain;
+// Gain = S·(w·(D − t) − delay·σ·slope − (1 − σ)·worth of the rest), and no delay is negative, since
+// no way round is quicker.
+double Solution::insertion_gain(int uav, int place, int task, double least) const {
+  const std::vector<Visit>& visits = flights_[uav].visits;
+  const Visit* next = place < static_cast<int>(visits.size()) ? &visits[place] : nullptr;
+  const double survived = survived_before(uav, place);
+  const Pairing* found = at_hand(uav, task);
+  const double weight = found == nullptr ? problem_->weight(uav, task) : found->weight;
+  double survival = 1.0;
+  if (next != nullptr)
+    survival = found == nullptr ? problem_->survival(uav, task) : found->survival;
+  const double lost = next == nullptr ? 0.0 : (1.0 - survival) * next->worth;
+  double completion_s = ready_s(uav, place) + problem_->service_s(task);
+  if (survived * (weight * (problem_->horizon_s() - completion_s) - lost) <= least) return least;
+  completion_s = reach_s(uav, place, task);
+  const double most = survived * (weight * (problem_->horizon_s() - completion_s) - lost);
+  if (next == nullptr || most <= least) return most;
+  const double delay_s =
+      completion_s +
+      problem_->quick_travel_s(uav, problem_->place_m(task), next->place_m) + next->service_s -
+      next->completion_s;
+  return most - survived * survival * delay_s * next->slope;
 }
 
 }  // namespace peckorder

@@ -3,6 +3,7 @@
 // Leaves out: which changes to try (routes_search.hpp, routes_local.hpp).
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <vector>
@@ -41,67 +42,139 @@ struct Insertion {
 };
 
 class Solution {
+ private:
+  // What an insertion beside a task asks of it, together in memory.
+  struct alignas(64) Visit {
+    double place_m[3];
+    double service_s;
+    double completion_s;
+    double survived_after;  // S after this task
+    double slope;           // of the tail from this task on, with S = 1 before it
+    double worth;           // of that tail at its present times, with S = 1 before it
+  };
+  // What a visit follows from.
+  struct Cause {
+    double leg_s;  // from the completion before it, or from nothing, to its own
+    double weight, survival;
+  };
+  struct Flight {
+    std::vector<Visit> visits;
+    std::vector<Cause> causes;
+    double value = 0.0;
+  };
+
  public:
+  // A list as it was.
+  class Copy {
+    friend class Solution;
+    Route route;
+    Flight flight;
+  };
+
   Solution(const Problem& problem, const Start& start);
 
   const Problem& problem() const { return *problem_; }
   const Start& start() const { return *start_; }
   const Route& route(int uav) const { return routes_[uav]; }
   const std::vector<Route>& routes() const { return routes_; }
-  double route_value(int uav) const { return value_[uav]; }
+  double route_value(int uav) const { return flights_[uav].value; }
   int uav_of(int task) const { return uav_of_[task]; }  // -1: on no list
   int place_of(int task) const { return place_of_[task]; }
-  double completion_s(int task) const { return visit_[task].completion_s; }
+  double completion_s(int uav, int place) const {
+    return flights_[uav].visits[place].completion_s;
+  }
+  // Distance of a place on a list from some point.
+  double straight_m(int uav, int place, const double* from_m) const {
+    return Problem::straight_m(from_m, flights_[uav].visits[place].place_m);
+  }
 
   // Forget all lists; only these UAVs may be given tasks from now on.
   void restrict_to(const std::vector<int>& uavs);
   const std::vector<int>& allowed() const { return allowed_; }
   bool is_allowed(int uav) const { return is_allowed_[uav] != 0; }
 
+  // Have the allowed UAVs' numbers at these tasks at hand, where a search takes most of its time to
+  // get at them; others are asked of the problem.
+  void gather(const std::vector<int>& tasks);
+
   void set_route(int uav, const Route& route);
   void insert(int uav, int place, int task);
   void remove(int uav, int place, int count);  // tasks at place..place+count-1
 
+  void copy(int uav, Copy& copy) const;
+  void restore(int uav, Copy& copy);  // which then holds the list that was replaced
+
   double total() const;       // Σ over the allowed UAVs' lists
   double mean_delay() const;  // mean over tasks of S·w·(t − start): the scale of differences in J
 
-  // Gain in J of inserting `task`, which is on no list, at `place` of `uav`'s list.
-  double insertion_gain(int uav, int place, int task) const;
+  bool capable(int uav, int task) const {
+    const Pairing* pairing = at_hand(uav, task);
+    return pairing == nullptr ? problem_->capable(uav, task) : pairing->capable;
+  }
+
+  // Gain in J of inserting `task`, which is on no list, at `place` of `uav`'s list; where it is no
+  // more than `least`, that or anything less.
+  double insertion_gain(int uav, int place, int task,
+                        double least = -std::numeric_limits<double>::infinity()) const;
 
   // What the segment before `place` hands on: survival, and the first completion that follows.
   double survived_before(int uav, int place) const {
-    return place == 0 ? start_->survived[uav] : visit_[routes_[uav][place - 1]].survived_after;
+    return place == 0 ? start_->survived[uav] : flights_[uav].visits[place - 1].survived_after;
   }
   double reach_s(int uav, int place, int task) const {
-    if (place == 0)
-      return start_->free_s[uav] + start_->travel_s(uav, task) + problem_->service_s(task);
-    const int before = routes_[uav][place - 1];
-    return visit_[before].completion_s + problem_->leg_s(uav, before, task);
+    return ready_s(uav, place) + way_s(uav, place, task);
   }
   // The rest of the list from `place` on, as flown by its own UAV: slope, and worth as timed.
   double tail_slope(int uav, int place) const {
-    return place == static_cast<int>(routes_[uav].size()) ? 0.0 : visit_[routes_[uav][place]].slope;
+    return place == static_cast<int>(routes_[uav].size()) ? 0.0 : flights_[uav].visits[place].slope;
   }
   double tail_worth(int uav, int place) const {
-    return place == static_cast<int>(routes_[uav].size()) ? 0.0 : visit_[routes_[uav][place]].worth;
+    return place == static_cast<int>(routes_[uav].size()) ? 0.0 : flights_[uav].visits[place].worth;
   }
 
  private:
-  struct Visit {
-    double completion_s;
-    double survived_after;  // S after this task
-    double slope;           // of the tail from this task on, with S = 1 before it
-    double worth;           // of that tail at its present times, with S = 1 before it
+  // One UAV at one task.
+  struct Pairing {
+    double weight, survival, first_way_s;
+    bool capable;
   };
 
+  // Null where it was not gathered.
+  const Pairing* at_hand(int uav, int task) const {
+    const int row = row_of_[task];
+    if (row < 0) return nullptr;
+    return &pairings_[static_cast<std::size_t>(row) * allowed_.size() + column_of_[uav]];
+  }
+  Pairing pairing(int uav, int task) const {
+    const Pairing* found = at_hand(uav, task);
+    return found == nullptr ? worked_out(uav, task) : *found;
+  }
+  Pairing worked_out(int uav, int task) const {
+    return {problem_->weight(uav, task), problem_->survival(uav, task),
+            start_->travel_s(uav, task) + problem_->service_s(task), problem_->capable(uav, task)};
+  }
+
+  // When what stands before `place` is done, and from then to completing `task` there.
+  double ready_s(int uav, int place) const {
+    return place == 0 ? start_->free_s[uav] : flights_[uav].visits[place - 1].completion_s;
+  }
+  double way_s(int uav, int place, int task) const {
+    if (place == 0) return pairing(uav, task).first_way_s;
+    const double* from_m = flights_[uav].visits[place - 1].place_m;
+    return problem_->quick_travel_s(uav, from_m, problem_->place_m(task)) +
+           problem_->service_s(task);
+  }
+
+  void put(int uav, int place, int task);
   void refresh(int uav, int from_place);
 
   const Problem* problem_;
   const Start* start_;
   std::vector<Route> routes_;
-  std::vector<double> value_;
-  std::vector<Visit> visit_;
+  std::vector<Flight> flights_;
   std::vector<int> uav_of_, place_of_, allowed_;
+  std::vector<int> column_of_, row_of_;  // of a UAV, and of a task or -1, among these:
+  std::vector<Pairing> pairings_;
   std::vector<std::uint8_t> is_allowed_;
 };
 
@@ -110,27 +183,33 @@ class Solution {
 template <class Skip>
 Insertion best_insertion(const Solution& solution, int task, Skip&& skip) {
   constexpr int kScanAllBelow = 150;
+  constexpr int kNear = 48;
   const Problem& problem = solution.problem();
   Insertion best;
   const auto offer = [&](int uav, int place) {
     if (skip()) return;
-    const double gain = solution.insertion_gain(uav, place, task);
+    const double gain = solution.insertion_gain(uav, place, task, best.gain);
     if (gain > best.gain) best = {uav, place, gain};
   };
   const bool all = problem.n_task() <= kScanAllBelow;
+  if (!all) {
+    const double* here_m = problem.place_m(task);
+    const std::int32_t* near = problem.near(task);
+    const int most = std::min(kNear, problem.n_near());
+    const double farthest_m = Problem::straight_m(here_m, problem.place_m(near[most - 1]));
+    for (int k = 0; k < most; ++k) {
+      const int uav = solution.uav_of(near[k]);
+      if (uav < 0 || !solution.capable(uav, task)) continue;
+      const int place = solution.place_of(near[k]);
+      offer(uav, place + 1);
+      // after a task that is as near, it is offered there
+      if (place > 0 && solution.straight_m(uav, place - 1, here_m) >= farthest_m) offer(uav, place);
+    }
+  }
   for (const int uav : solution.allowed()) {
-    if (!problem.capable(uav, task)) continue;
+    if (!solution.capable(uav, task)) continue;
     const int size = static_cast<int>(solution.route(uav).size());
     for (int place = 0; place <= (all ? size : 0); ++place) offer(uav, place);
-  }
-  if (all) return best;
-  const std::int32_t* near = problem.near(task);
-  for (int k = 0; k < problem.n_near(); ++k) {
-    const int uav = solution.uav_of(near[k]);
-    if (uav < 0 || !problem.capable(uav, task)) continue;
-    const int place = solution.place_of(near[k]);
-    if (place > 0) offer(uav, place);
-    offer(uav, place + 1);
   }
   return best;
 }

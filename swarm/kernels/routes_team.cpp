@@ -71,14 +71,14 @@ TeamSearch::TeamSearch(const Problem& problem, const Start& start, std::vector<R
   }
 }
 
-void TeamSearch::round(long iterations, double heat, int threads) {
+void TeamSearch::round(long iterations, double heat, int threads, Watch& watch) {
   if (uavs_.empty()) return;
   if (divided_) divide();
   const double now = temperature(hottest_, heat);
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t lane; (lane = next.fetch_add(1)) < lanes_.size();)
-      lanes_[lane]->run(iterations, now);
+      lanes_[lane]->run(iterations, now, watch);
   };
   std::vector<std::thread> helpers;
   for (int k = 1; k < std::min<int>(threads, n_lane()); ++k) helpers.emplace_back(work);

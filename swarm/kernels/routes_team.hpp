@@ -26,8 +26,9 @@ class TeamSearch {
   TeamSearch(const TeamSearch&) = delete;
   TeamSearch& operator=(const TeamSearch&) = delete;
 
-  // `iterations` per lane; heat within 0..1, 1 at the beginning of the annealing, 0 at its end.
-  void round(long iterations, double heat, int threads);
+  // `iterations` per lane, fewer if the watch stops them; heat within 0..1, 1 at the beginning of
+  // the annealing, 0 at its end.
+  void round(long iterations, double heat, int threads, Watch& watch);
 
   // Iterations per lane that take some 10 ms, and per task that an annealing from full heat takes.
   long most_iterations() const { return most_iterations_; }
