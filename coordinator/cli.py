@@ -86,22 +86,34 @@ def plan(
         bool,
         typer.Option(
             "--bound/--no-bound",
-            help="Where the optimum cannot be proven, spend some seconds on an upper bound on J.",
+            help="Where the optimum is not proven at once, spend some seconds on an upper bound on J, "
+            "which may prove it.",
         ),
     ] = True,
+    bound_s: Annotated[
+        float | None,
+        typer.Option(
+            "--bound-s",
+            min=0.01,
+            metavar="S",
+            help="So long instead, after the search and beyond its time limit.",
+            show_default=False,
+        ),
+    ] = None,
 ) -> int:
     """Compute the priority sequence, and the task lists it leads to.
 
     Of a scenario of schema 2 also the schedule: swaps, waits, ways home, and what is left out.
     Tasks that appear later are unknown to a plan. The same seed gives the same plan,
     unless --time-limit-s cuts the search short. That limit holds for all but drawing and exporting:
-    reading, searching and the bound. Ctrl-C ends the search with the best so far.
+    reading, searching and the bound, but what --bound-s asks for. Ctrl-C ends the search with the best so far.
 
     Examples:
         swarm plan table-1
         swarm plan valley-survey --plot lists.png
         swarm plan valley-survey --method guided --export plans
         swarm plan table-1 --method exact --json
+        swarm plan valley-survey --method guided --time-limit-s 10 --bound-s 60
         swarm plan reservoir-inspection --method guided --plot map.png
     """
     from swarm.runtime.clock import SystemClock
@@ -129,8 +141,12 @@ def plan(
         require_plain(mission, "swarm plan --export")
         require_origin(mission, str(scenario))
     try:
-        with _searching() as (interrupted, progress):
-            limit = None if time_limit_s is None else after_time(clock, time_limit_s, begin_s)
+        with _searching() as (interrupted, progress, proving):
+            limit, kept_frac = None, bound_frac(time_limit_s)
+            if time_limit_s is not None:
+                whole_s = time_limit_s + (bound_s or 0.0)
+                limit = after_time(clock, whole_s, begin_s)
+                kept_frac = bound_s / whole_s if bound_s else kept_frac
             result = make_plan(
                 mission,
                 method,
@@ -138,8 +154,9 @@ def plan(
                 seed=seed,
                 stop=interrupted if limit is None else first_of(limit, interrupted),
                 progress=progress,
-                bound_s=BOUND_S if bound else None,
-                bound_frac=bound_frac(time_limit_s),
+                bound_progress=proving,
+                bound_s=(bound_s or BOUND_S) if bound else None,
+                bound_frac=kept_frac,
             )
             told_to_stop = interrupted(0)
     except ProblemTooLargeError as error:
@@ -194,13 +211,15 @@ def _status_line() -> contextlib.AbstractContextManager[Status | None]:
 
 
 @contextlib.contextmanager
-def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float], None]]]:
-    """Whether Ctrl-C was pressed, and a place to show how far a search is.
+def _searching() -> Iterator[
+    tuple[Callable[[float], bool], Callable[[int, float], None], Callable[[float], None]]
+]:
+    """Whether Ctrl-C was pressed, and places to show how far a search and a proof are.
 
     The first Ctrl-C asks for the best so far; a second one interrupts. Progress shows on a
     terminal only.
     """
-    pressed = False
+    pressed, best = False, 0.0
 
     def on_interrupt(_number: int, _frame: FrameType | None) -> None:
         nonlocal pressed
@@ -213,10 +232,17 @@ def _searching() -> Iterator[tuple[Callable[[float], bool], Callable[[int, float
         with _status_line() as show:
 
             def progress(evaluations: int, worth: float) -> None:
+                nonlocal best
+                best = worth
                 if show is not None:
                     show.update(f"planning: {evaluations} tried, best J {worth:.2f} value·s")
 
-            yield lambda _: pressed, progress
+            def proving(bound: float) -> None:
+                if show is not None:
+                    gap = f", gap {100.0 * (bound / best - 1.0):.2f} %" if best > 0.0 else ""
+                    show.update(f"proving: no lists have more than {bound:.2f} value·s{gap}")
+
+            yield lambda _: pressed, progress, proving
     finally:
         signal.signal(signal.SIGINT, before)
 

@@ -11,48 +11,47 @@ which no task need be on any. Relax "each task at most once" with prices π >= 0
 
     J <= Σ_i π_i + Σ_j max over lists of (worth_j − Σ π along the list)    for every π >= 0.
 
-Each maximum is bounded from above by a dynamic programme over (task, bucket of time) in which
-legs are rounded down to whole buckets (completions only become earlier, terms only larger) and a
-task may be visited again (more lists than there are); `swarm.kernels.routes_bound`. The prices
-begin as what each task adds to known lists and follow subgradients, a group of UAVs at a time
-(incremental subgradients: Nedić and Bertsekas 2001, doi:10.1137/S1052623499362111) with Polyak's
-step at first, which then shrinks. Any prices yield a bound, and the least one seen is kept. Who
-bounds those maxima otherwise passes that in.
+`swarm.kernels.routes_pricing.price_lists` bounds each maximum from above, exact in time. The prices
+begin as what each task adds to known lists; which ones to try next a proximal bundle method says
+from all lists found so far (`lagrangian_bound`). Any prices yield a bound, and the least one seen
+is kept. Where that is close enough to the best lists known, those that could still be part of better
+ones are named and the best of them chosen (`coordinator.planner.closing`): then the bound is the
+optimum.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
 
-from coordinator.planner.options import Limit, ShouldStop, never
-from swarm.allocation.objective import evaluate
-from swarm.allocation.problem import FloatArray, IntArray, Problem
+from coordinator.planner.closing import best_disjoint
+from coordinator.planner.options import ShouldStop, never
+from swarm.allocation.problem import FloatArray, Problem
 from swarm.allocation.rules import team_at_start
 from swarm.kernels.routes import TeamArrays
-from swarm.kernels.routes_bound import priced_lists, shortest_legs_s
+from swarm.kernels.routes_pricing import ListBundle, PricedLists, price_lists, worthy_lists
 
-Pricing = Callable[[TeamArrays, FloatArray], tuple[float, IntArray]]
-"""Of lists; see `swarm.kernels.routes_bound.priced_lists`."""
-_GROUPS = 10
-_FIRST_STRIDE = 2.0
-_LAST_STRIDE = 0.1
-_FEWEST_CYCLES = 4
-_MOST_CYCLES = 150
-_BETWEEN_BOUNDS = 3
-"""Cycles over all groups between two evaluations of the bound."""
-_OPERATIONS = 4e10
-"""Of the dynamic programme in all: some 8 s on two cores."""
-_FINEST, _COARSEST = 400.0, 50.0
-"""Buckets up to the horizon."""
-_SHORT_FRAC = 0.1
-"""Of the tasks, those from which a leg may be below a bucket."""
-_MOST_BUCKETS = 1000.0
-"""However short legs are; with more, legs of a few buckets take most of the time."""
-_ROUNDING = 1e-9
+Pricing = Callable[[FloatArray], PricedLists | None]
+"""The best lists at given prices, bounded from above; None where it was told to stop."""
+_MOST_ROUNDS = 200
+_FIRST_STEP, _LONGEST_STEP = 0.1, 1000.0
+"""By how much the price of a task on two lists rises first, as a share of the bound per task; and
+how many times as long a step may get before no prices are taken to be better."""
+_LONGER, _SHORTER = 2.0, 0.7
+_ACCEPTED, _GOOD = 0.1, 0.5
+"""Shares of the expected gain from which on prices become the centre, and steps longer."""
+_SWEEPS = 300
+_SETTLED = 1e-7
+"""Of the bound: no prices lower it by more."""
+_ROUNDING = 2e-10
+_MET = 1e-9
+_CLOSING_HEADS = 100_000
+"""Beginnings of lists looked at, per UAV, when those that might be part of an optimum are named."""
+_MOST_WORTHY = 50_000
+"""Lists that are chosen from."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,8 +60,30 @@ class UpperBound:
 
     objective: float
     """[value·s]."""
-    steps: int
-    """Cycles of price changes made."""
+    rounds: int
+    """Of prices tried."""
+    lists: tuple[tuple[int, ...], ...] | None = None
+    """Better ones than were known, where they were met while the optimum was proven."""
+
+
+def meets(bound: float, objective: float) -> bool:
+    """Whether no lists are better, but for rounding."""
+    return bound <= objective + _MET * abs(objective)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Relaxed:
+    """The least bound that prices were found to yield."""
+
+    bound: float
+    """[value·s]; infinite where none was found."""
+    price: FloatArray
+    """(n_task,) these prices [value·s]."""
+    earned: FloatArray
+    """(n_uav,) no list earns more at these prices [value·s]."""
+    rounds: int
+    settled: bool
+    """Other prices yield no bound that is much lower."""
 
 
 def trivial_bound(problem: Problem) -> float:
@@ -87,128 +108,186 @@ def upper_bound(
     should_stop: ShouldStop = never,
     *,
     threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> UpperBound:
-    """The better of the trivial and the Lagrangian bound; some seconds at 50 UAVs × 500 tasks.
-
-    Where the dynamic programme would take much longer only the trivial bound is given: thousands
-    of tasks, or most legs very short against the horizon.
+    """The least bound that is found before it is told to stop; the trivial one at least.
 
     Args:
         problem: the mission, from its start.
         lists: good ones; the better they are the sooner the prices are right.
-        should_stop: asked between cycles of price changes with the cycles made, and about 0 every
-            few milliseconds.
+        should_stop: asked after each round of prices with the rounds made, and about 0 every few
+            milliseconds.
         threads: at most this many; does not change the result.
+        progress: told each lower bound when it is found [value·s].
     """
     trivial = trivial_bound(problem)
-    if problem.n_task < 2 or problem.n_uav == 0 or should_stop(0.0):
-        return UpperBound(trivial, 0)
-    if _affordable_cycles(problem, _COARSEST) < _FEWEST_CYCLES:
+    if problem.n_task == 0 or problem.n_uav == 0 or should_stop(0.0):
         return UpperBound(trivial, 0)
     team = team_at_start(problem)
-    bucket_s, cycles = _affordable(problem, team)
-    if cycles < _FEWEST_CYCLES:
-        return UpperBound(trivial, 0)
-    known = max(0.0, evaluate(problem, lists)[0])
-    price = _marginal_worth(problem, lists)
-    pricing = partial(
-        priced_lists, bucket_s=bucket_s, threads=threads, should_stop=lambda: should_stop(0.0)
+
+    def stops() -> bool:
+        return should_stop(0.0)
+
+    lowest = trivial
+
+    def note(bound: float) -> None:
+        nonlocal lowest
+        bound += _ROUNDING * abs(bound)
+        if bound < lowest:
+            lowest = bound
+            if progress is not None:
+                progress(bound)
+
+    known = _Known.of(problem, lists)
+    relaxed = lagrangian_bound(
+        partial(price_lists, team, threads=threads, should_stop=stops),
+        known.price,
+        known.bundle(problem.n_uav),
+        enough=known.worth,
+        should_stop=should_stop,
+        progress=note,
     )
-    lowest, made = lagrangian_bound(
-        team, pricing, price, cycles, known=known, should_stop=should_stop
-    )
-    return UpperBound(min(lowest, trivial), made)
+    better: tuple[tuple[int, ...], ...] | None = None
+    if relaxed.settled and team.problem.certain and relaxed.bound > known.worth:
+        closed, better = _closed(team, relaxed, known.worth, stops, threads)
+        note(closed)
+    return UpperBound(lowest, relaxed.rounds, better)
 
 
 def lagrangian_bound(
-    team: TeamArrays,
     pricing: Pricing,
     price: FloatArray,
-    cycles: int,
+    bundle: ListBundle,
     *,
-    known: float = 0.0,
-    expected: float | None = None,
+    enough: float = 0.0,
+    rounds: int = _MOST_ROUNDS,
     should_stop: ShouldStop = never,
-) -> tuple[float, int]:
-    """The least Σ π + Σ of priced lists that is seen while prices follow subgradients.
+    progress: Callable[[float], None] | None = None,
+) -> Relaxed:
+    """The least Σ π + Σ of what lists earn that is seen while a bundle method moves the prices.
 
     Args:
-        team: mission and state.
-        pricing: bounds the best lists of the active UAVs from above, given prices, and tells how
-            often some such lists visit each task; NaN where it was told to stop.
-        price: (n_task,) to begin with [value·s]; >= 0.
-        cycles: over all UAVs, at most.
-        known: worth of lists that are known; no bound is below it.
-        expected: guess of the optimum, which scales the first step; ``known`` when None.
-        should_stop: asked between cycles with the cycles made; along a `Limit` the steps shrink.
+        pricing: bounds the best list of each UAV from above at given prices.
+        price: (n_task,) to begin with [value·s]; >= 0; the centre of ``bundle``.
+        bundle: knows lists already, and learns those that are found.
+        enough: no lower bound is looked for [value·s].
+        rounds: prices that are tried, at most.
+        should_stop: asked after each round with the rounds made.
+        progress: told the bound of each round [value·s].
+    """
+    n_uav = bundle.n_uav
+    best = Relaxed(np.inf, price, np.zeros(n_uav), 0, settled=False)
+    centre = expected = np.inf
+    step = longest = 0.0
+    made, settled = 0, False
 
-    Returns:
-        The bound [value·s], infinite if it was stopped before there was any, and the cycles made.
+    def stops() -> bool:
+        return should_stop(0.0)
+
+    while (found := pricing(price)) is not None:
+        bound = float(price.sum() + found.bound.sum())
+        if bound < best.bound:
+            best = Relaxed(bound, price, found.bound, made, settled=False)
+        if progress is not None:
+            progress(bound)
+        made += 1
+        some = [uav for uav, one in enumerate(found.lists) if one]
+        bundle.add(some, found.worth[some], [found.lists[uav] for uav in some])
+        if made == 1:
+            step = _FIRST_STEP * max(bound, _ROUNDING) / max(1, len(price))
+            longest = _LONGEST_STEP * step
+        gain = centre - expected
+        if made == 1 or centre - bound >= _ACCEPTED * gain:
+            if made > 1 and centre - bound >= _GOOD * gain:
+                step *= _LONGER
+            bundle.accept()
+            centre = bound
+        elif bound >= centre:
+            step *= _SHORTER
+        if made == rounds or best.bound <= enough or should_stop(made):
+            break
+        while True:
+            tolerance = _SETTLED * abs(centre) / (10.0 * n_uav)
+            price = bundle.solve(step, tolerance, sweeps=_SWEEPS, should_stop=stops)
+            expected = bundle.value
+            settled = centre - expected <= _SETTLED * abs(centre)
+            if not settled or step >= longest or stops():
+                break
+            step *= 10.0  # nothing to gain near by is no reason to stay
+        if settled:
+            break
+    return Relaxed(best.bound, best.price, best.earned, made, settled)
+
+
+def _closed(
+    team: TeamArrays,
+    relaxed: Relaxed,
+    known: float,
+    stops: Callable[[], bool],
+    threads: int | None,
+) -> tuple[float, tuple[tuple[int, ...], ...] | None]:
+    """The optimum over disjoint lists and lists that reach it, where these can be named.
+
+    Where they are too many the bound stays as it is.
     """
     n_uav = team.problem.n_uav
-    n_group = min(_GROUPS, n_uav)
-    groups = [
-        replace(team, active=np.asarray(team.active) & (np.arange(n_uav) % n_group == group))
-        for group in range(n_group)
-    ]
-    lowest, made, first_stride = np.inf, 0, 0.0
-    while True:
-        if made % _BETWEEN_BOUNDS == 0 or made == cycles or should_stop(made):
-            worth, visits = pricing(team, price)
-            if np.isnan(worth):
-                break
-            bound = float(price.sum()) + worth
-            lowest = min(lowest, bound)
-            slope = 1.0 - visits
-            slope[(price <= 0.0) & (slope > 0.0)] = 0.0
-            square = float(slope @ slope)
-            if made == 0 and square > 0.0:
-                guess = known if expected is None else expected
-                first_stride = _FIRST_STRIDE * (bound - guess) / square
-            if made == cycles or square == 0.0 or bound <= known or should_stop(made):
-                break
-        spent = should_stop.spent_frac(made) if isinstance(should_stop, Limit) else 0.0
-        shrunk: float = (_LAST_STRIDE / _FIRST_STRIDE) ** min(1.0, max(spent, made / cycles))
-        for group in groups:
-            _, visits = pricing(group, price)
-            price = np.maximum(0.0, price - first_stride * shrunk * (1.0 / n_group - visits))
-        made += 1
-    return lowest + _ROUNDING * abs(lowest), made
+    floor = relaxed.earned - (relaxed.bound - known)
+    worthy = worthy_lists(
+        team, relaxed.price, floor, heads=_CLOSING_HEADS, threads=threads, should_stop=stops
+    )
+    if worthy is None or len(worthy.lists) > _MOST_WORTHY:
+        return relaxed.bound, None
+    found = best_disjoint(
+        worthy, relaxed.price, n_uav, known=known, bound=relaxed.bound, should_stop=stops
+    )
+    if found.chosen is None:
+        return found.bound, None
+    better: list[tuple[int, ...]] = [()] * n_uav
+    for k in found.chosen:
+        better[int(worthy.uav[k])] = tuple(worthy.lists[k])
+    return found.bound, tuple(better)
 
 
-def _affordable(problem: Problem, team: TeamArrays) -> tuple[float, int]:
-    """Width of buckets [s] and cycles that `_OPERATIONS` allow; 0 cycles where that is too few.
+@dataclass(frozen=True, slots=True, eq=False)
+class _Known:
+    """What the lists at hand tell of prices."""
 
-    Tasks joined by legs below a bucket are worth to each other what all of them are worth, so most
-    legs should be longer. That a few are not costs little: what it joins are pairs.
-    """
-    horizon_s = problem.horizon_s
-    short_s = max(float(np.quantile(shortest_legs_s(team), _SHORT_FRAC)), horizon_s / _MOST_BUCKETS)
-    bucket_s, cycles = 0.0, 0
-    for most in (_FINEST, _COARSEST):
-        bucket_s = min(short_s, horizon_s / most)
-        cycles = _affordable_cycles(problem, horizon_s / bucket_s)
-        if cycles >= _MOST_CYCLES / 2:
-            break
-    return bucket_s, cycles
+    uav: list[int]
+    worths: list[float]
+    lists: list[Sequence[int]]
+    price: FloatArray
+    """(n_task,) what their worth loses if a task is taken off, at least 0."""
+    worth: float
+    """Of all of them."""
 
+    @classmethod
+    def of(cls, problem: Problem, lists: Sequence[Sequence[int]]) -> _Known:
+        """The lists, and each without one of its tasks."""
+        known = cls([], [], [], np.zeros(problem.n_task), 0.0)
+        total = 0.0
+        for uav, route in enumerate(lists):
+            if not route:
+                continue
+            whole = _list_worth(problem, uav, route)
+            total += whole
+            known._note(uav, whole, route)
+            for place, task in enumerate(route):
+                without = [*route[:place], *route[place + 1 :]]
+                rest = _list_worth(problem, uav, without)
+                known.price[task] = max(0.0, whole - rest)
+                if without:
+                    known._note(uav, rest, without)
+        return cls(known.uav, known.worths, known.lists, known.price, total)
 
-def _affordable_cycles(problem: Problem, buckets: float) -> int:
-    """Cycles that `_OPERATIONS` allow with so many buckets."""
-    each = problem.n_uav * problem.n_task**2 * (buckets / 2.0 + 10.0)
-    passes = _OPERATIONS / max(1.0, each)
-    return int(min(_MOST_CYCLES, passes * _BETWEEN_BOUNDS / (_BETWEEN_BOUNDS + 1.0) - 1.0))
+    def _note(self, uav: int, worth: float, route: Sequence[int]) -> None:
+        self.uav.append(uav)
+        self.worths.append(worth)
+        self.lists.append(route)
 
-
-def _marginal_worth(problem: Problem, lists: Sequence[Sequence[int]]) -> FloatArray:
-    """(n_task,) what J loses if a task is taken off the lists, at least 0."""
-    price = np.zeros(problem.n_task)
-    for uav, route in enumerate(lists):
-        whole = _list_worth(problem, uav, route)
-        for place, task in enumerate(route):
-            without = [*route[:place], *route[place + 1 :]]
-            price[task] = max(0.0, whole - _list_worth(problem, uav, without))
-    return price
+    def bundle(self, n_uav: int) -> ListBundle:
+        bundle = ListBundle(n_uav, self.price)
+        bundle.add(self.uav, self.worths, self.lists)
+        return bundle
 
 
 def _list_worth(problem: Problem, uav: int, route: Sequence[int]) -> float:

@@ -20,7 +20,7 @@ wind let a way over a third place be quicker than the straight one.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -30,7 +30,8 @@ from coordinator.planner.options import ShouldStop, never
 from swarm.allocation.field.problem import BoolArray, FieldProblem, FloatArray
 from swarm.kernels._kernels import KernelProblem
 from swarm.kernels.routes import TeamArrays
-from swarm.kernels.routes_bound import Timetable, priced_lists
+from swarm.kernels.routes_bound import Timetable, relaxed_lists
+from swarm.kernels.routes_pricing import ListBundle, PricedLists
 
 _ROUNDING = 1e-9
 _TOLERANCE_S = 2e-6
@@ -41,9 +42,8 @@ _MOST_LEGS = 20_000_000
 """Legs between tasks, of all UAVs, that a timetable may have: 160 MB."""
 _OPERATIONS = 1.2e10
 """Of the dynamic programme in all: some 3 s on two cores."""
-_PASSES_PER_CYCLE = 4.0 / 3.0
 _FEWEST_BUCKETS, _MOST_BUCKETS = 200, 2000
-_FEWEST_CYCLES, _MOST_CYCLES = 4, 150
+_FEWEST_ROUNDS, _MOST_ROUNDS = 4, 200
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ def field_bound(
 
     Args:
         problem: the mission, from its start.
-        should_stop: asked between cycles of price changes with the cycles made, and about 0 every
+        should_stop: asked after each round of prices with the rounds made, and about 0 every
             few milliseconds.
         known: J of lists that are known [value·s].
         price: (n_task,) what each task adds to them, roughly [value·s]; nothing when None.
@@ -81,21 +81,21 @@ def field_bound(
     best = (problem.weight * left_s).max(axis=0, initial=0.0)
     trivial = float(best.sum()) * (1.0 + _ROUNDING)
     lowest = trivial
-    if _affordable(problem)[1] >= _FEWEST_CYCLES and trivial > 0.0 and not should_stop(0.0):
+    if _affordable(problem)[1] >= _FEWEST_ROUNDS and trivial > 0.0 and not should_stop(0.0):
         lowest = _lagrangian(problem, reach, should_stop, known, price, threads)
     return FieldBound(left_out, min(lowest, trivial))
 
 
 def _affordable(problem: FieldProblem) -> tuple[int, int]:
-    """Buckets up to the latest until and cycles that `_OPERATIONS` allow; 0 where too few."""
+    """Buckets up to the latest until and rounds that `_OPERATIONS` allow; 0 where too few."""
     legs = problem.n_uav * problem.n_task**2
     if legs > _MOST_LEGS or problem.n_task < 2:
         return _FEWEST_BUCKETS, 0
     passes = _OPERATIONS / legs
-    finest = 2.0 * (passes / (_MOST_CYCLES * _PASSES_PER_CYCLE) - 10.0)
+    finest = 2.0 * (passes / _MOST_ROUNDS - 10.0)
     buckets = int(min(_MOST_BUCKETS, max(_FEWEST_BUCKETS, finest)))
-    cycles = passes / (buckets / 2.0 + 10.0) / _PASSES_PER_CYCLE - 1.0
-    return buckets, int(min(_MOST_CYCLES, cycles))
+    rounds = passes / (buckets / 2.0 + 10.0)
+    return buckets, int(min(_MOST_ROUNDS, rounds))
 
 
 class _Reach:
@@ -214,21 +214,32 @@ def _lagrangian(
     )
     least = np.where(reach.possible, problem.weight, np.inf).min(axis=0)
     beyond = np.where(np.isfinite(least), least, 0.0) * (until_s - problem.until_s)
-    buckets, cycles = _affordable(problem)
+    buckets, rounds = _affordable(problem)
     timetable = reach.timetable(2.0 * until_s + 1.0)
 
-    def pricing(some: TeamArrays, prices: FloatArray) -> tuple[float, npt.NDArray[np.int64]]:
-        return priced_lists(
-            some,
+    def pricing(prices: FloatArray) -> PricedLists | None:
+        found = relaxed_lists(
+            team,
             prices + beyond,
             until_s / buckets,
             timetable=timetable,
             threads=threads,
             should_stop=lambda: should_stop(0.0),
         )
+        if found is None:
+            return None
+        # What is paid because it is beyond is no price that could be changed.
+        net = [
+            worth - sum(beyond[one]) for worth, one in zip(found.worth, found.lists, strict=True)
+        ]
+        return replace(found, worth=np.array(net))
 
     begin = np.zeros(n_task) if price is None else price
-    lowest, _ = lagrangian_bound(
-        team, pricing, begin, cycles, known=max(0.0, known), should_stop=should_stop
-    )
-    return lowest
+    return lagrangian_bound(
+        pricing,
+        begin,
+        ListBundle(n_uav, begin),
+        enough=max(0.0, known),
+        rounds=rounds,
+        should_stop=should_stop,
+    ).bound * (1.0 + _ROUNDING)

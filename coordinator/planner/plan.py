@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coordinator.planner.bound import upper_bound
+from coordinator.planner.bound import UpperBound, meets, upper_bound
 from coordinator.planner.exact import Optimum, estimated_s, optimum_before
 from coordinator.planner.options import (
     Limit,
@@ -31,7 +31,7 @@ from coordinator.planner.sequence_search import (
 )
 from swarm.allocation import RULE_NAMES, Rule, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.allocation.problem import Problem
-from swarm.allocation.rules import GuidedRule, team_arrays
+from swarm.allocation.rules import GuidedRule, team_arrays, team_at_start
 from swarm.kernels.lower_level import EXACT_TASKS
 from swarm.kernels.routes import TeamArrays, optimise_routes
 from swarm.model import Mission, Plan, TaskId, UavId
@@ -172,6 +172,7 @@ def make_plan(
     threads: int | None = None,
     modest: bool = False,
     rates: Mapping[str, FlightRates] | None = None,
+    bound_progress: Callable[[float], None] | None = None,
 ) -> Plan:
     """Plan a mission.
 
@@ -189,6 +190,7 @@ def make_plan(
         threads: at most this many, of processors if None; changes nothing but speed.
         modest: search little for a sequence; costs 0.1 % of J at 10 × 50, saves most of the time.
         rates: how UAVs fly, where that is known to be otherwise than a mission in the field says.
+        bound_progress: told each lower bound when it is found [value·s].
 
     Returns:
         The plan; ``exact`` has no sequence. Where the limit came before the end of the first
@@ -210,14 +212,20 @@ def make_plan(
     begin_s = clock.now_s()
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop
-    search = _PlanRequest(problem, method, seed, stop, progress, threads, modest)
+    search = _PlanRequest(problem, method, seed, stop, progress, threads, modest, bound_progress)
     proven = search.proven()
     keeps = proven is None and bound_s is not None and bound_frac > 0.0
     search_ends = part_of(ends, 1.0 - bound_frac) if keeps else ends
     routes, sequence, evaluations = search.lists(proven, search_ends)
+    best, bound = (None if proven is None else evaluate(problem, proven.routes)[0]), None
+    if proven is None and bound_s is not None:
+        found = search.bound(routes, first_of(after_time(clock, bound_s), ends))
+        if method == GuidedRule.name and found.lists is not None:
+            routes, sequence = _better(problem, routes, sequence, found.lists)
+        best, bound = None, found.objective
     objective, completion_s = evaluate(problem, routes)
-    bound_ends = None if bound_s is None else first_of(after_time(clock, bound_s), ends)
-    bound = search.bound(routes, bound_ends) if proven is None else None
+    if bound is not None and meets(bound, objective):
+        best, bound = objective, None
     plan = Plan(
         scenario=mission.name,
         method=method if isinstance(method, str) else method.name,
@@ -228,7 +236,7 @@ def make_plan(
         },
         sequence=None if sequence is None else tuple(problem.uav_ids[uav] for uav in sequence),
         # The same lists summed in another order may be 1e-15 off.
-        optimum=None if proven is None else max(evaluate(problem, proven.routes)[0], objective),
+        optimum=None if best is None else max(best, objective),
         evaluations=evaluations,
         elapsed_s=clock.now_s() - begin_s,
         seed=seed,
@@ -252,6 +260,7 @@ class _PlanRequest:
     progress: Progress | None
     threads: int | None
     modest: bool
+    bound_progress: Callable[[float], None] | None
 
     def proven(self) -> Optimum | None:
         """The optimum where it is asked for or quickly proven; None otherwise, or if stopped."""
@@ -262,11 +271,11 @@ class _PlanRequest:
             ends = part_of(ends, _PROOF_FRAC)
         return optimum_before(self.problem, lambda: ends(0.0), threads=self.threads)
 
-    def bound(self, routes: Sequence[Sequence[int]], ends: ShouldStop | None) -> float | None:
+    def bound(self, routes: Sequence[Sequence[int]], ends: ShouldStop) -> UpperBound:
         """The least bound on J that is found before `ends`; `routes` are known already."""
-        if ends is None:
-            return None
-        return upper_bound(self.problem, routes, ends, threads=self.threads).objective
+        return upper_bound(
+            self.problem, routes, ends, threads=self.threads, progress=self.bound_progress
+        )
 
     def lists(
         self, proven: Optimum | None, ends: ShouldStop
@@ -320,6 +329,19 @@ class _Reached:
         """Whether it is found."""
         del iterations
         return self.reached
+
+
+def _better(
+    problem: Problem,
+    routes: Sequence[Sequence[int]],
+    sequence: tuple[int, ...] | None,
+    others: Sequence[Sequence[int]],
+) -> tuple[Sequence[Sequence[int]], tuple[int, ...] | None]:
+    """The lists with the larger J, of those that hold the same tasks, and the sequence to them."""
+    same = {task for route in routes for task in route} == {task for one in others for task in one}
+    if not same or evaluate(problem, others)[0] <= evaluate(problem, routes)[0]:
+        return routes, sequence
+    return others, _sequence(problem, team_at_start(problem), others)
 
 
 def _by_id(problem: Problem, routes: Sequence[Sequence[int]]) -> dict[UavId, tuple[TaskId, ...]]:

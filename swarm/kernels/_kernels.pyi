@@ -345,7 +345,7 @@ def improve_routes(
     Annotated[NDArray[numpy.int64], dict(shape=(None,))],
     Annotated[NDArray[numpy.int64], dict(shape=(None,))],
 ]: ...
-def shortest_legs_s(
+def price_lists(
     problem: KernelProblem,
     free_s: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
@@ -359,7 +359,59 @@ def shortest_legs_s(
     active: Annotated[
         NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
-) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+    open: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    prices: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    heads: int,
+    threads: int,
+    should_stop: object | None = None,
+) -> tuple[
+    bool,
+    Annotated[NDArray[numpy.float64], dict(shape=(None,))],
+    Annotated[NDArray[numpy.float64], dict(shape=(None,))],
+    tuple[
+        Annotated[NDArray[numpy.int64], dict(shape=(None,))],
+        Annotated[NDArray[numpy.int64], dict(shape=(None,))],
+    ],
+]: ...
+def worthy_lists(
+    problem: KernelProblem,
+    free_s: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    place_m: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    survived: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    active: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    open: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    prices: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    floors: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    heads: int,
+    threads: int,
+    should_stop: object | None = None,
+) -> tuple[
+    bool,
+    Annotated[NDArray[numpy.int64], dict(shape=(None,))],
+    Annotated[NDArray[numpy.float64], dict(shape=(None,))],
+    tuple[
+        Annotated[NDArray[numpy.int64], dict(shape=(None,))],
+        Annotated[NDArray[numpy.int64], dict(shape=(None,))],
+    ],
+]: ...
 
 class Timetable:
     def __init__(
@@ -382,7 +434,7 @@ class Timetable:
         ],
     ) -> None: ...
 
-def priced_lists(
+def relaxed_lists(
     problem: KernelProblem,
     free_s: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
@@ -407,7 +459,45 @@ def priced_lists(
     expansions: int,
     threads: int,
     should_stop: object | None = None,
-) -> tuple[float, Annotated[NDArray[numpy.int64], dict(shape=(None,))]]: ...
+) -> tuple[
+    bool,
+    Annotated[NDArray[numpy.float64], dict(shape=(None,))],
+    Annotated[NDArray[numpy.float64], dict(shape=(None,))],
+    tuple[
+        Annotated[NDArray[numpy.int64], dict(shape=(None,))],
+        Annotated[NDArray[numpy.int64], dict(shape=(None,))],
+    ],
+]: ...
+
+class ListBundle:
+    def __init__(
+        self,
+        n_uav: int,
+        prices: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+    ) -> None: ...
+    def add(
+        self,
+        uavs: Annotated[
+            NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        worth: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        flat: Annotated[
+            NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+        offsets: Annotated[
+            NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+    ) -> None: ...
+    def solve(
+        self, step: float, tolerance: float, sweeps: int, should_stop: object | None = None
+    ) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
+    def accept(self) -> None: ...
+    def value(self) -> float: ...
+    def shares(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 
 class KernelField:
     def __init__(

@@ -17,6 +17,7 @@ void bind_lower_level(nanobind::module_& module);
 void bind_problem(nanobind::module_& module);
 void bind_rollout(nanobind::module_& module);
 void bind_routes(nanobind::module_& module);
+void bind_routes_pricing(nanobind::module_& module);
 void bind_tours(nanobind::module_& module);
 
 }  // namespace peckorder

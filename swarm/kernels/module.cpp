@@ -10,6 +10,7 @@ NB_MODULE(_kernels, module) {
     peckorder::bind_exact(module);
     peckorder::bind_rollout(module);
     peckorder::bind_routes(module);
+    peckorder::bind_routes_pricing(module);
     peckorder::bind_field(module);
     peckorder::bind_field_exact(module);
     peckorder::bind_field_team(module);

@@ -82,23 +82,6 @@ bool Problem::alike(int uav, int other) const {
            same(by_uav_.weight) && same(by_uav_.survival) && same(by_uav_.capable);
 }
 
-std::vector<int> Problem::fastest(const std::vector<int>& uavs) const {
-    const auto as_fast = [this](int a, int b) {
-        return pace_s_m_[a] <= pace_s_m_[b] &&
-               ramps_[a].acceleration_m_s2 >= ramps_[b].acceleration_m_s2;
-    };
-    std::vector<int> fastest;
-    for (const int uav : uavs) {
-        if (std::any_of(fastest.begin(), fastest.end(), [&](int f) { return as_fast(f, uav); }))
-            continue;
-        fastest.erase(std::remove_if(fastest.begin(), fastest.end(),
-                                     [&](int f) { return as_fast(uav, f); }),
-                      fastest.end());
-        fastest.push_back(uav);
-    }
-    return fastest;
-}
-
 void Problem::lay_out() const {
     std::call_once(laid_out_, [this] {
         turn_table();

@@ -158,11 +158,6 @@ class Problem {
         return quick_travel_s(uav, from, to) + service_s_[to];
     }
 
-    // Of these UAVs so many that on every leg one of them is as fast as any: those to whom nobody is
-    // at least equal in both speed and acceleration, of equals the first. One, if all change speed
-    // at once.
-    std::vector<int> fastest(const std::vector<int>& uavs) const;
-
     static double straight_m(const double* from_m, const double* to_m) {
         return length_m(to_m[0] - from_m[0], to_m[1] - from_m[1], to_m[2] - from_m[2]);
     }

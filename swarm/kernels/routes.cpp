@@ -11,7 +11,6 @@
 #include "arrays.hpp"
 #include "bindings.hpp"
 #include "routes_binding.hpp"
-#include "routes_bound.hpp"
 #include "routes_local.hpp"
 #include "routes_team.hpp"
 #include "watch_binding.hpp"
@@ -21,8 +20,6 @@ namespace nb = nanobind;
 namespace peckorder {
 
 namespace {
-
-using Table = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 template <class Array>
 std::vector<double> copied(const Array& array) {
@@ -115,54 +112,6 @@ void bind_routes(nb::module_& module) {
       },
       nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"), nb::arg("flat"), nb::arg("offsets"));
-
-  module.def(
-      "shortest_legs_s",
-      [](const Problem& problem, const Vector& free_s, const Matrix& place_m,
-         const Vector& survived, const Mask& active) {
-        std::vector<double> legs_s;
-        {
-          const nb::gil_scoped_release released;
-          const Start start = StartArrays{free_s, place_m, survived, active}.start(problem);
-          legs_s = shortest_legs_s(problem, start);
-        }
-        return give(std::move(legs_s));
-      },
-      nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
-      nb::arg("active"));
-
-  nb::class_<Timetable>(module, "Timetable")
-      .def(
-          "__init__",
-          [](Timetable* self, const Matrix& first_s, const Table& leg_s, const Matrix& earliest_s,
-             const Matrix& latest_s) {
-            new (self) Timetable{static_cast<int>(first_s.shape(1)), copied(first_s),
-                                 copied(leg_s), copied(earliest_s), copied(latest_s)};
-          },
-          nb::arg("first_s"), nb::arg("leg_s"), nb::arg("earliest_s"), nb::arg("latest_s"));
-
-  module.def(
-      "priced_lists",
-      [](const Problem& problem, const Vector& free_s, const Matrix& place_m,
-         const Vector& survived, const Mask& active, const Mask& open, const Vector& prices,
-         double bucket_s, const Timetable* timetable, long expansions, int threads,
-         nb::handle should_stop) {
-        const StartArrays arrays{free_s, place_m, survived, active};
-        const std::vector<int> tasks = open_tasks(open);
-        const std::vector<double> price = copied(prices);
-        std::vector<int> visits;
-        double value;
-        PythonWatch(should_stop).released([&](Watch& watch) {
-          value = priced_lists(problem, arrays.start(problem),
-                               {tasks, price, bucket_s, timetable, expansions, threads}, visits,
-                               watch);
-        });
-        return std::make_pair(value, to_array({visits.begin(), visits.end()}));
-      },
-      nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
-      nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("bucket_s"),
-      nb::arg("timetable").none(), nb::arg("expansions"), nb::arg("threads"),
-      nb::arg("should_stop") = nb::none());
 }
 
 }  // namespace peckorder

@@ -198,7 +198,7 @@ def optimise_routes(
         if progress is not None:
             progress(done, search.best_value())
     search.polish(lambda: not time_spent_frac() < 1.0)
-    return _routes(*search.best()), search.best_value()
+    return lists_of(*search.best()), search.best_value()
 
 
 def _heat(spent_frac: float, total: float, full: float) -> float:
@@ -213,7 +213,7 @@ def _heat(spent_frac: float, total: float, full: float) -> float:
 def improve_routes(team: TeamArrays, lists: Sequence[Sequence[int]]) -> Routes:
     """Lists after local search, in which no move gains any more; tasks stay those on the lists."""
     arrays = open_lists(team, lists)
-    return _routes(*_kernels.improve_routes(team.problem, *team.arguments(), *arrays))
+    return lists_of(*_kernels.improve_routes(team.problem, *team.arguments(), *arrays))
 
 
 def flat_lists(
@@ -236,6 +236,12 @@ def flat_lists(
     return flat, offsets
 
 
+def lists_of(flat: npt.NDArray[np.int64], offsets: npt.NDArray[np.int64]) -> Routes:
+    """List k is flat[offsets[k]:offsets[k + 1]]."""
+    tasks, ends = flat.tolist(), offsets.tolist()
+    return [tasks[begin:end] for begin, end in pairwise(ends)]
+
+
 def open_lists(
     team: TeamArrays, lists: Sequence[Sequence[int]] | None
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
@@ -249,11 +255,6 @@ def open_lists(
     kept_offsets = np.zeros_like(offsets)
     np.cumsum(np.bincount(uav[keep], minlength=problem.n_uav), out=kept_offsets[1:])
     return flat[keep], kept_offsets
-
-
-def _routes(flat: npt.NDArray[np.int64], offsets: npt.NDArray[np.int64]) -> Routes:
-    tasks, ends = flat.tolist(), offsets.tolist()
-    return [tasks[begin:end] for begin, end in pairwise(ends)]
 
 
 def _floats(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArray:

@@ -1,12 +1,12 @@
 #include "routes_bound.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <limits>
 #include <numeric>
 #include <queue>
-#include <thread>
 #include <utility>
+
+#include "parallel.hpp"
 
 namespace peckorder {
 
@@ -21,12 +21,12 @@ constexpr double kNear = 1e-5;         // of a value: as good as reached by the 
 
 // One UAV's tasks, what they are worth to it and when it can complete them, times counted from when
 // it is free.
-struct Offer {
+struct TimedOffer {
   double left_s;                 // until the horizon
   std::vector<int> tasks;
   std::vector<double> weight, survival, price, first_s, leg_s, earliest_s, latest_s;
 
-  Offer(const Problem& problem, const Start& start, int uav, const Pricing& pricing)
+  TimedOffer(const Problem& problem, const Start& start, int uav, const RelaxedPricing& pricing)
       : left_s(problem.horizon_s() - start.free_s[uav]) {
     const Timetable* table = pricing.timetable;
     const double free_s = start.free_s[uav];
@@ -68,7 +68,7 @@ struct Offer {
 class RelaxedLists {
  public:
   // Of no use once the watch has stopped it.
-  RelaxedLists(const Offer& offer, double bucket_s, Watch& watch)
+  RelaxedLists(const TimedOffer& offer, double bucket_s, Watch& watch)
       : offer_(offer), n_(offer.n()), bucket_s_(bucket_s) {
     double last_s = n_ == 0 ? -1.0 : *std::max_element(offer.latest_s.begin(), offer.latest_s.end());
     last_s = std::min(last_s, offer.left_s);
@@ -217,7 +217,7 @@ class RelaxedLists {
       if (!offer_.ends(k)) rest_[k * row_ + bucket] = all - own(k) + leave;
   }
 
-  const Offer& offer_;
+  const TimedOffer& offer_;
   int n_;
   double bucket_s_;
   int last_;
@@ -231,7 +231,7 @@ class RelaxedLists {
 // bounds every list not yet seen.
 class RealLists {
  public:
-  RealLists(const Offer& offer, const RelaxedLists& relaxed) : offer_(offer), relaxed_(relaxed) {}
+  RealLists(const TimedOffer& offer, const RelaxedLists& relaxed) : offer_(offer), relaxed_(relaxed) {}
 
   double best(long expansions, std::vector<int>& list, Watch& watch) {
     std::vector<char> on_it(offer_.n(), 0);
@@ -290,7 +290,7 @@ class RealLists {
     if (most > node.value) open_.emplace(most, at);
   }
 
-  const Offer& offer_;
+  const TimedOffer& offer_;
   const RelaxedLists& relaxed_;
   std::vector<Node> nodes_;
   std::priority_queue<std::pair<double, int>> open_;
@@ -298,59 +298,33 @@ class RealLists {
   int best_ = -1;       // its last task
 };
 
-std::vector<int> active_uavs(const Start& start) {
-  std::vector<int> uavs;
-  for (std::size_t uav = 0; uav < start.active.size(); ++uav)
-    if (start.active[uav]) uavs.push_back(static_cast<int>(uav));
-  return uavs;
-}
-
-double priced_list(const Problem& problem, const Start& start, int uav, const Pricing& pricing,
-                   std::vector<int>& list, Watch& watch) {
-  const Offer offer(problem, start, uav, pricing);
+PricedList relaxed_list(const Problem& problem, const Start& start, int uav,
+                        const RelaxedPricing& pricing, Watch& watch) {
+  PricedList found;
+  const TimedOffer offer(problem, start, uav, pricing);
   watch.stops_after(static_cast<std::int64_t>(offer.n()) * offer.n() / 2);
   const RelaxedLists relaxed(offer, pricing.bucket_s, watch);
-  if (relaxed.last() < 0 || watch.stopped()) return 0.0;
-  if (pricing.expansions == 0) return relaxed.best(list);
-  return RealLists(offer, relaxed).best(pricing.expansions, list, watch);
+  if (relaxed.last() < 0 || watch.stopped()) return found;
+  found.bound = pricing.expansions == 0
+                    ? relaxed.best(found.list)
+                    : RealLists(offer, relaxed).best(pricing.expansions, found.list, watch);
+  found.worth = found.bound;
+  for (const int task : found.list) found.worth += pricing.prices[task];
+  return found;
 }
 
 }  // namespace
 
-std::vector<double> shortest_legs_s(const Problem& problem, const Start& start) {
-  const std::vector<int> fastest = problem.fastest(active_uavs(start));
-  std::vector<double> shortest_s(problem.n_task(), kInfinite);
-  for (const int uav : fastest)
-    for (int a = 0; a < problem.n_task(); ++a)
-      for (int b = 0; b < problem.n_task(); ++b)
-        if (a != b) shortest_s[a] = std::min(shortest_s[a], problem.leg_s(uav, a, b));
-  return shortest_s;
-}
-
-double priced_lists(const Problem& problem, const Start& start, const Pricing& pricing,
-                    std::vector<int>& visits, Watch& watch) {
-  const std::vector<int> uavs = active_uavs(start);
-  std::vector<std::vector<int>> lists(uavs.size());
-  std::vector<double> values(uavs.size(), 0.0);
-  std::atomic<std::size_t> next{0};
-  const auto work = [&] {
-    for (std::size_t k; (k = next.fetch_add(1)) < uavs.size();)
-      if (!watch.stopped())
-        values[k] = priced_list(problem, start, uavs[k], pricing, lists[k], watch);
-  };
-  std::vector<std::thread> helpers;
-  for (int k = 1; k < std::min<int>(pricing.threads, static_cast<int>(uavs.size())); ++k)
-    helpers.emplace_back(work);
-  work();
-  for (std::thread& helper : helpers) helper.join();
-  visits.assign(problem.n_task(), 0);
-  if (watch.stopped()) return std::numeric_limits<double>::quiet_NaN();
-  double sum = 0.0;
-  for (std::size_t k = 0; k < uavs.size(); ++k) {
-    sum += values[k];
-    for (const int task : lists[k]) ++visits[task];
-  }
-  return sum;
+std::vector<PricedList> relaxed_lists(const Problem& problem, const Start& start,
+                                      const RelaxedPricing& pricing, Watch& watch) {
+  std::vector<PricedList> found(start.active.size());
+  parallel_for(found.size(), pricing.threads, 1, [&] {
+    return [&](std::size_t uav) {
+      if (start.active[uav] && !watch.stopped())
+        found[uav] = relaxed_list(problem, start, static_cast<int>(uav), pricing, watch);
+    };
+  });
+  return found;
 }
 
 }  // namespace peckorder

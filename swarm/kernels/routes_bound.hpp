@@ -8,7 +8,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "routes_solution.hpp"
+#include "routes_pricing.hpp"
 #include "watch.hpp"
 
 namespace peckorder {
@@ -28,8 +28,8 @@ struct Timetable {
   }
 };
 
-// What is asked of `priced_lists`.
-struct Pricing {
+// What is asked of `relaxed_lists`.
+struct RelaxedPricing {
   const std::vector<int>& open;        // tasks
   const std::vector<double>& prices;   // (n_task,)
   double bucket_s;                     // > 0
@@ -38,13 +38,10 @@ struct Pricing {
   int threads;
 };
 
-// Per task, the shortest leg from completing it to completing another that any active UAV can fly;
-// infinite without another task or such a UAV [s].
-std::vector<double> shortest_legs_s(const Problem& problem, const Start& start);
-
-// Σ over active UAVs of max(0, best relaxed list); visits[i] counts task i on the lists found.
-// The same for any number of threads. NaN once the watch has stopped it.
-double priced_lists(const Problem& problem, const Start& start, const Pricing& pricing,
-                    std::vector<int>& visits, Watch& watch);
+// The best relaxed list of each UAV, or a real one where the search among these ended; the inactive
+// ones included. A task may come more than once; what a list is worth before paying is `bound` and
+// what it pays. The same for any number of threads; of no use once the watch has stopped it.
+std::vector<PricedList> relaxed_lists(const Problem& problem, const Start& start,
+                                      const RelaxedPricing& pricing, Watch& watch);
 
 }  // namespace peckorder

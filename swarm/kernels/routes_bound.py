@@ -1,6 +1,6 @@
-"""The relaxed pricing problem behind upper bounds on J; see `coordinator.planner.bound`.
+"""Best lists against prices where times do not follow from places; see `coordinator.planner.bound`.
 
-For one UAV and a price per task, the best list of Σ p·S₀·m·(D − t)⁺ − price, with times in whole
+`swarm.kernels.routes_pricing` is closer where they do. For one UAV and a price per task, the best list of Σ p·S₀·m·(D − t)⁺ − price, with times in whole
 buckets, each leg rounded down, S taken as that of the start, and tasks allowed more than once.
 From that relaxation a search among real lists may go on, with exact times, S as eq. 1 has it, and
 every task once: best-first, by what a list is worth so far and what the relaxation can still add.
@@ -18,7 +18,8 @@ import numpy as np
 import numpy.typing as npt
 
 from swarm.kernels import _kernels
-from swarm.kernels.routes import FloatArray, TeamArrays
+from swarm.kernels.routes import FloatArray, TeamArrays, lists_of
+from swarm.kernels.routes_pricing import PricedLists
 
 MOST_BUCKETS = 100_000
 
@@ -57,15 +58,7 @@ class Timetable:
         object.__setattr__(self, "kernel", kernel)
 
 
-def shortest_legs_s(team: TeamArrays) -> FloatArray:
-    """(n_task,) least time from completing each task to completing another, by any active UAV [s].
-
-    Infinite where there are fewer than two tasks or no active UAV.
-    """
-    return _kernels.shortest_legs_s(team.problem, *team.arguments())
-
-
-def priced_lists(
+def relaxed_lists(
     team: TeamArrays,
     price: FloatArray,
     bucket_s: float,
@@ -74,7 +67,7 @@ def priced_lists(
     expansions: int = 0,
     threads: int | None = None,
     should_stop: Callable[[], bool] | None = None,
-) -> tuple[float, npt.NDArray[np.int64]]:
+) -> PricedLists | None:
     """Best lists of all active UAVs, each for itself, over the open tasks; relaxed ones at first.
 
     Time grows with active UAVs · tasks² · buckets, memory per thread with tasks ·
@@ -91,8 +84,8 @@ def priced_lists(
         should_stop: asked every few milliseconds whether to give up.
 
     Returns:
-        Sum of what the lists are worth after paying, each at least 0, and (n_task,) how often each
-        task is visited by them; NaN and 0 where it was told to give up.
+        The lists, and what they are worth with times in whole buckets; None where it was told to
+        give up.
 
     Raises:
         ValueError: names the argument that is wrong.
@@ -112,7 +105,7 @@ def priced_lists(
         raise ValueError(f"expansions must be >= 0, not {expansions}")
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be >= 1, not {threads}")
-    return _kernels.priced_lists(
+    done, bound, worth, lists = _kernels.relaxed_lists(
         team.problem,
         *team.arguments(),
         np.asarray(team.open),
@@ -123,6 +116,7 @@ def priced_lists(
         (os.cpu_count() or 1) if threads is None else threads,
         should_stop,
     )
+    return PricedLists(bound, worth, lists_of(*lists)) if done else None
 
 
 def _times(

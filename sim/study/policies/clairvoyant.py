@@ -49,24 +49,23 @@ from swarm.allocation import Problem
 from swarm.allocation.problem import BoolArray, FloatArray, IntArray, straight_m
 from swarm.allocation.rules import team_at_start
 from swarm.kernels.routes import TeamArrays
-from swarm.kernels.routes_bound import Timetable, priced_lists
+from swarm.kernels.routes_bound import Timetable, relaxed_lists
+from swarm.kernels.routes_pricing import ListBundle
 from swarm.model import Task, Uav
 
-_CYCLES = 60
+_ROUNDS = 60
 _OPERATIONS = 1e10
 """Of the dynamic programme in all: some ten seconds."""
-_FEWEST_CYCLES = 4
+_FEWEST_ROUNDS = 4
 _BUCKETS_PER_TASK = 30.0
 """Up to the horizon, per task on a UAV's list."""
 _FEWEST_BUCKETS, _MOST_BUCKETS = 150, 400
 _EXPANSIONS = 2000
 """Of the search among real lists, per list; with lists of some five tasks it seldom needs them."""
 _REACHED = 4e6
-"""Places at which all these searches of a cycle may look."""
+"""Places at which all these searches of a round may look."""
 _FIRST_PRICE = 0.5
 """Of a task, as a share of what it is worth when reached straight from the best start."""
-_EXPECTED = 0.9
-"""Guess of the optimum, as a share of the first bound; it scales the first step alone."""
 _MOST_ATTEMPTS = 64
 """Looked at; after these the next is taken to succeed."""
 _SLACK_S = 1e-6
@@ -99,21 +98,20 @@ def clairvoyant_bound(fate: Realization) -> float:
         return 0.0
     buckets = _BUCKETS_PER_TASK * n_task / n_uav
     buckets = min(max(buckets, _FEWEST_BUCKETS), _MOST_BUCKETS)
-    cycles = min(_CYCLES, int(_OPERATIONS / (n_uav * n_task**2 * buckets)))
-    if cycles < _FEWEST_CYCLES:
+    rounds = min(_ROUNDS, int(_OPERATIONS / (n_uav * n_task**2 * buckets)))
+    if rounds < _FEWEST_ROUNDS:
         return trivial
     pricing = partial(
-        priced_lists,
+        relaxed_lists,
+        hindsight.team,
         bucket_s=fate.mission.horizon_s / buckets,
         timetable=hindsight.timetable,
         expansions=min(_EXPANSIONS, int(_REACHED / (n_uav * n_task))),
         threads=1,
     )
     price = _FIRST_PRICE * direct
-    first = float(price.sum()) + pricing(hindsight.team, price)[0]
-    expected = _EXPECTED * min(first, trivial)
-    lowest, _ = lagrangian_bound(hindsight.team, pricing, price, cycles, expected=expected)
-    return min(lowest, trivial)
+    relaxed = lagrangian_bound(pricing, price, ListBundle(n_uav, price), rounds=rounds)
+    return min(relaxed.bound * (1.0 + 1e-9), trivial)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

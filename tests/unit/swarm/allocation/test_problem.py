@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from swarm.allocation import Problem, TeamState
 from swarm.allocation.rules import team_at_start
 from swarm.kernels.lower_level import GREEDY, decide
-from swarm.kernels.routes_bound import shortest_legs_s
 from swarm.model import Task, TaskId, UavId
 from tests.support.problems import (
     random_problem,
@@ -220,23 +219,3 @@ def test_a_mission_tells_of_accelerations_uav_by_uav() -> None:
         assert each.acceleration_m_s2.tolist() == [2.0, np.inf, np.inf]
         assert each.travel_between_s(0).tolist() == problem.travel_between_s(0).tolist()
     assert problem.travel_between_s(1).tolist() == table_1().travel_between_s(1).tolist()
-
-
-def test_who_is_fastest_depends_on_the_leg_where_one_speeds_up_and_one_cruises_best() -> None:
-    problem = Problem(
-        uav_ids=(UavId("racer"), UavId("truck")),
-        task_ids=tuple(TaskId(f"t{place}") for place in range(3)),
-        start_enu_m=np.zeros((2, 3)),
-        task_enu_m=np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [101.0, 0.0, 0.0]]),
-        speed_m_s=np.array([5.0, 20.0]),
-        value=np.ones(3),
-        service_s=np.zeros(3),
-        success=np.ones((2, 3)),
-        survival=np.ones((2, 3)),
-        horizon_s=100.0,
-        acceleration_m_s2=np.array([np.inf, 4.0]),
-    )
-
-    shortest_s = shortest_legs_s(team_at_start(problem))
-
-    assert shortest_s.tolist() == pytest.approx([1.0 / 5.0, 1.0 / 5.0, 100.0 / 20.0 + 5.0])

@@ -1,0 +1,136 @@
+#include "routes_heads.hpp"
+
+#include <algorithm>
+#include <map>
+
+namespace peckorder {
+
+PricedList Heads::search(long most, Watch& watch) {
+  const int n = offer_.n(), memory = offer_.head_memory();
+  for (int i = 0; i < n; ++i) reach({offer_.first_s[i], 0.0, i, -1, 1});
+  long continued = 0;
+  double left = 0.0;  // of what was not continued
+  while (!open_.empty()) {
+    const auto [bound, minus] = open_.top();
+    if (!promising(bound)) break;
+    if (continued == most) {
+      left = bound;
+      break;
+    }
+    open_.pop();
+    const Head head = heads_[-minus];
+    if (head.dropped) continue;
+    ++continued;
+    if (watch.stops_after(n * 8)) return {};
+    for (int next = 0; next < n; ++next) {
+      if (next == head.task || offer_.knows(head.known, head.task, next, memory)) continue;
+      const double time_s = head.time_s + offer_.leg_s(head.task, next);
+      if (time_s < offer_.latest_s[next])
+        reach({time_s, head.earned, next, -minus,
+               offer_.moved(head.known, head.task, next, memory)});
+    }
+  }
+  PricedList found;
+  found.bound = std::max(best_, left);
+  found.worth = best_;
+  for (int k = best_head_; k >= 0; k = heads_[k].before) {
+    found.worth += offer_.price[heads_[k].task];
+    found.list.push_back(offer_.tasks[heads_[k].task]);
+  }
+  std::reverse(found.list.begin(), found.list.end());
+  return found;
+}
+
+void Heads::reach(Head head) {
+  const double bound = head.earned + tails_.best(head.task, head.time_s, head.known);
+  if (!promising(bound)) return;
+  head.earned += offer_.gain(head.task, head.time_s);
+  const int own = static_cast<int>(heads_.size());
+  if (!enter(own, head)) return;
+  heads_.push_back(head);
+  if (head.earned > best_) {
+    best_ = head.earned;
+    best_head_ = own;
+  }
+  if (bound > head.earned) open_.emplace(bound, -own);
+}
+
+bool Heads::enter(int own, const Head& head) {
+  const auto as_good = [](const Head& a, const Head& b) {
+    return a.time_s <= b.time_s && a.earned >= b.earned && (a.known & ~b.known) == 0;
+  };
+  std::vector<int>& others = at_[head.task];
+  for (const int other : others)
+    if (as_good(heads_[other], head)) return false;
+  const auto overtaken = [&](int other) {
+    return heads_[other].dropped = as_good(head, heads_[other]);
+  };
+  others.erase(std::remove_if(others.begin(), others.end(), overtaken), others.end());
+  others.push_back(own);
+  return true;
+}
+
+namespace {
+
+class Enumeration {
+ public:
+  Enumeration(const Offer& offer, const Tails& tails, double floor, long most, Watch& watch)
+      : offer_(offer), tails_(tails), floor_(floor), left_(most), watch_(watch),
+        on_it_(offer.n(), 0) {}
+
+  WorthyLists run() {
+    for (int i = 0; i < offer_.n(); ++i) reach(i, offer_.first_s[i], 0.0, 0.0, 1);
+    WorthyLists found;
+    found.all = left_ > 0 && !watch_.stopped();
+    for (const auto& [tasks, list] : best_) {
+      found.lists.push_back(list.second);
+      found.worth.push_back(list.first);
+    }
+    return found;
+  }
+
+ private:
+  void reach(int i, double time_s, double earned, double worth, Memory known) {
+    if (left_ <= 0 || earned + tails_.best(i, time_s, known) < floor_) return;
+    if (watch_.stops_after(offer_.n() * 8)) left_ = 0;
+    --left_;
+    earned += offer_.gain(i, time_s);
+    worth += offer_.weight[i] * (offer_.left_s - time_s);
+    list_.push_back(offer_.tasks[i]);
+    on_it_[i] = 1;
+    if (earned >= floor_) keep(worth);
+    for (int next = 0; next < offer_.n(); ++next) {
+      if (on_it_[next]) continue;
+      const double then_s = time_s + offer_.leg_s(i, next);
+      if (then_s < offer_.latest_s[next])
+        reach(next, then_s, earned, worth, offer_.moved(known, i, next, offer_.head_memory()));
+    }
+    on_it_[i] = 0;
+    list_.pop_back();
+  }
+
+  void keep(double worth) {
+    Route tasks = list_;
+    std::sort(tasks.begin(), tasks.end());
+    auto& best = best_[tasks];
+    if (best.second.empty() || worth > best.first) best = {worth, list_};
+  }
+
+  const Offer& offer_;
+  const Tails& tails_;
+  double floor_;
+  long left_;
+  Watch& watch_;
+  std::vector<char> on_it_;
+  Route list_;
+  std::map<Route, std::pair<double, Route>> best_;  // by their tasks in order
+};
+
+}  // namespace
+
+WorthyLists lists_from(const Offer& offer, const Tails& tails, double floor, long most,
+                       Watch& watch) {
+  return Enumeration(offer, tails, floor, most, watch).run();
+}
+
+}  // namespace peckorder

@@ -1,0 +1,49 @@
+// The best list of each UAV against prices of tasks, exact in time: what a Lagrangian bound sums up.
+//
+// A list earns Σ w·(D − t) − price over its tasks. Lists are taken from a set a little larger than
+// the real ones: a task may come again once its list has left the tasks around it (ng-routes:
+// Baldacci, Mingozzi, Roberti 2011, doi:10.1287/opre.1110.0975). Survival is left out (1). First
+// tails of lists are joined from their ends (routes_tails.hpp); what they can add at most guides a
+// search among beginnings (routes_heads.hpp). See coordinator/planner/bound.py.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "routes_solution.hpp"
+#include "watch.hpp"
+
+namespace peckorder {
+
+// What is asked of `price_lists` and `worthy_lists`.
+struct ListPricing {
+  const std::vector<int>& open;       // tasks
+  const std::vector<double>& prices;  // (n_task,)
+  long heads;                         // beginnings of lists that are continued at most, per UAV
+  int threads;
+};
+
+struct PricedList {
+  double bound = 0.0;  // no list is worth more after paying
+  double worth = 0.0;  // before paying, of the best list found
+  Route list;          // it; a task may come twice
+};
+
+// One per UAV, the inactive ones included. The same for any number of threads; of no use once the
+// watch has stopped it.
+std::vector<PricedList> price_lists(const Problem& problem, const Start& start,
+                                    const ListPricing& pricing, Watch& watch);
+
+struct WorthyLists {
+  bool all = true;  // none is missing
+  std::vector<Route> lists;
+  std::vector<double> worth;  // of each, before paying
+};
+
+// Per UAV all real lists, the empty one apart, worth at least its floor after paying; of those with
+// the same tasks the best.
+std::vector<WorthyLists> worthy_lists(const Problem& problem, const Start& start,
+                                      const ListPricing& pricing,
+                                      const std::vector<double>& floors, Watch& watch);
+
+}  // namespace peckorder

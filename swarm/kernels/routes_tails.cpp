@@ -1,0 +1,104 @@
+#include "routes_tails.hpp"
+
+#include <algorithm>
+
+namespace peckorder {
+
+namespace {
+constexpr int kMostBorn = 300'000;
+}  // namespace
+
+Tails::Tails(const Offer& offer, Watch& watch)
+    : offer_(offer), lines_(offer.n()), coming_(offer.n()) {
+  const int n = offer_.n();
+  for (int i = 0; i < n; ++i) {
+    const double w = offer_.weight[i];
+    lines_[i].push_back({w * offer_.left_s - offer_.price[i], w, 1, born_++});
+    coming_[i] = lines_[i];
+  }
+  // In round r those of r tasks; a real list has n at most.
+  for (int round = 1; round < n; ++round) {
+    std::vector<std::vector<Line>> fresh(n);
+    fresh.swap(coming_);
+    bool any = false;
+    for (int i = 0; i < n; ++i) {
+      for (const Line& line : fresh[i]) {
+        const Span span = useful(i, line, {offer_.first_s[i], offer_.latest_s[i]});
+        if (!span.empty() && extend(i, line, span, watch)) any = true;
+        if (overflown_ || watch.stopped()) return;
+      }
+    }
+    if (!any) return;
+    for (int i = 0; i < n; ++i)
+      if (!coming_[i].empty()) tidy(i);
+  }
+}
+
+Tails::Span Tails::useful(int i, const Line& line, Span span) const {
+  if (span.empty()) return span;
+  double low = line.a - line.w * span.from_s, high = line.a - line.w * span.until_s;
+  for (const Line& other : lines_[i]) {
+    if ((other.known & ~line.known) != 0 || other.born == line.born) continue;
+    const double more_low = low - (other.a - other.w * span.from_s);
+    const double more_high = high - (other.a - other.w * span.until_s);
+    if (more_low > 0.0 && more_high > 0.0) continue;
+    if (more_low <= 0.0 && more_high <= 0.0) {
+      const bool equal = more_low == 0.0 && more_high == 0.0 && other.known == line.known;
+      if (equal && line.born < other.born) continue;  // of equals the older one stays
+      return {0.0, -1.0};
+    }
+    const double cross_s = (line.a - other.a) / (line.w - other.w);
+    if (more_low > 0.0) {
+      span.until_s = std::min(span.until_s, cross_s);
+      high = line.a - line.w * span.until_s;
+    } else {
+      span.from_s = std::max(span.from_s, cross_s);
+      low = line.a - line.w * span.from_s;
+    }
+    if (span.empty()) return span;
+  }
+  return span;
+}
+
+bool Tails::extend(int i, const Line& line, Span span, Watch& watch) {
+  // From a / w on it is worth nothing, and the task before it does better as the last one.
+  const double until_s = std::min(span.until_s, line.a / line.w);
+  bool any = false;
+  std::int64_t steps = 1;
+  for (const Offer::Arc* arc = offer_.arcs_begin(i); arc != offer_.arcs_end(i); ++arc) {
+    if (arc->reach_s >= until_s) break;
+    const int h = arc->from;
+    if (offer_.knows(line.known, i, h, offer_.tail_memory(i))) continue;
+    const double leg_s = arc->reach_s - offer_.first_s[h], w = offer_.weight[h];
+    const Span own{std::max(offer_.first_s[h], span.from_s - leg_s),
+                   std::min(offer_.latest_s[h], until_s - leg_s)};
+    if (own.empty()) continue;
+    const Line longer{line.a - line.w * leg_s + w * offer_.left_s - offer_.price[h], line.w + w,
+                      offer_.moved(line.known, i, h, offer_.tail_memory(h)), born_};
+    steps += static_cast<std::int64_t>(lines_[h].size()) / 4 + 2;
+    if (useful(h, longer, own).empty()) continue;
+    if (++born_ > kMostBorn) overflown_ = true;
+    lines_[h].push_back(longer);
+    coming_[h].push_back(longer);
+    any = true;
+  }
+  watch.stops_after(steps);
+  return any && !overflown_;
+}
+
+// Drops lines that others have overtaken.
+void Tails::tidy(int i) {
+  std::vector<Line>& lines = lines_[i];
+  const int oldest_coming = coming_[i].front().born;
+  coming_[i].clear();
+  for (std::size_t k = 0; k < lines.size();) {
+    if (useful(i, lines[k], {offer_.first_s[i], offer_.latest_s[i]}).empty()) {
+      lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(k));
+      continue;
+    }
+    if (lines[k].born >= oldest_coming) coming_[i].push_back(lines[k]);
+    ++k;
+  }
+}
+
+}  // namespace peckorder
