@@ -58,6 +58,8 @@ class KernelProblem:
     def capable(
         self,
     ) -> Annotated[NDArray[numpy.bool_], dict(shape=(None, None), writable=False)]: ...
+    @property
+    def near(self) -> Annotated[NDArray[numpy.int32], dict(shape=(None, None), writable=False)]: ...
 
 class TourTable:
     def __init__(

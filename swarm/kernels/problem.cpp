@@ -226,9 +226,18 @@ void bind_problem(nb::module_& module) {
                          const auto& problem = nb::cast<const Problem&>(self);
                          return view<double>(self, problem, problem.weights(0));
                      })
-        .def_prop_ro("capable", [](nb::handle self) {
+        .def_prop_ro("capable",
+                     [](nb::handle self) {
+                         const auto& problem = nb::cast<const Problem&>(self);
+                         return view<bool>(self, problem, problem.abilities(0));
+                     })
+        .def_prop_ro("near", [](nb::handle self) {
             const auto& problem = nb::cast<const Problem&>(self);
-            return view<bool>(self, problem, problem.abilities(0));
+            problem.lay_out();
+            const std::size_t shape[2] = {static_cast<std::size_t>(problem.n_task()),
+                                          static_cast<std::size_t>(problem.n_near())};
+            return nb::ndarray<nb::numpy, const std::int32_t, nb::ndim<2>>(problem.near(0), 2,
+                                                                           shape, self);
         });
 }
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import copy
 import gc
 import pickle
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ import pytest
 from swarm.allocation import Problem, TeamState
 from swarm.kernels._kernels import KernelProblem
 from swarm.kernels.lower_level import GREEDY, decide
-from tests.support.problems import table_1
+from tests.support.problems import random_problem, table_1
 
 
 def arguments() -> dict[str, Any]:
@@ -106,3 +107,25 @@ def test_problems_survive_copying_and_pickling() -> None:
     for twin in (copy.deepcopy(problem), pickle.loads(pickle.dumps(problem))):
         assert twin.task_ids == problem.task_ids
         assert decide(twin.kernel, state, 0, GREEDY) == decide(problem.kernel, state, 0, GREEDY)
+
+
+@pytest.mark.parametrize("n_task", [1, 2, 30, 60, 300])
+@pytest.mark.parametrize("spread_m", [(1e3, 1e3, 0.0), (0.0, 1e3, 50.0), (0.0, 0.0, 0.0)])
+def test_near_tasks_are_those_nearest_by_straight_line_and_then_by_index(
+    n_task: int, spread_m: tuple[float, float, float]
+) -> None:
+    rng = np.random.default_rng(n_task)
+    # Whole numbers, so that many are equally far away.
+    places_m = np.round(rng.uniform(0.0, 0.02, (n_task, 3)) * spread_m)
+    problem = replace(random_problem(rng, 2, n_task), task_enu_m=places_m)
+
+    near = problem.kernel.near
+
+    assert near.shape == (n_task, min(48, n_task - 1))
+    for task in range(n_task):
+        offset_m = places_m - places_m[task]
+        others = np.delete(np.arange(n_task), task)
+        away_m2 = (offset_m**2).sum(axis=1)[others]
+        assert (
+            near[task].tolist() == others[np.lexsort((others, away_m2))][: near.shape[1]].tolist()
+        )
