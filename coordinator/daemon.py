@@ -13,7 +13,7 @@ import asyncio
 import threading
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass
-from typing import TypeVar
+from functools import partial
 
 from coordinator.core.active import CoordinatorCore
 from coordinator.core.lifecycle import (
@@ -28,7 +28,7 @@ from coordinator.core.lifecycle import (
     TakeSeat,
 )
 from coordinator.core.standby import MakeCoordinator, StandbyCore
-from coordinator.planner.online import ReplanResult, replan
+from coordinator.planner.online import replan, replan_limit_s
 from coordinator.planner.options import ShouldStop, after_time, first_of
 from swarm.bus.port import Bus
 from swarm.bus.zenoh_bus import ZenohBus
@@ -44,11 +44,8 @@ from swarm.runtime.shell import Shell, join_mission
 from swarm.runtime.store import Store
 
 MissionPlanner = Callable[[MakePlan, ShouldStop], Plan]
-T = TypeVar("T")
-
-
-REPLAN_S = 2.0
-"""Wall time that a running mission waits for a better plan, valuing it included."""
+_ENDS_S = 1.0
+"""How long the end of the process waits for a plan that has been told to stop; it takes 50 ms."""
 
 
 async def run_coordinator(
@@ -118,7 +115,10 @@ async def run_coordinator(
 
 
 class BackgroundPlanner:
-    """Plans beside a core, on threads that do not hold the process up; one plan at a time.
+    """Plans beside a core, on a thread that does not hold the process up; one plan at a time.
+
+    A plan that is superseded is told to stop, which takes it some 50 ms, and the newest one that is
+    wanted begins once it has. Of others nobody hears.
 
     Args:
         make_plan: plans a mission as it is wanted; told to stop once nobody waits for the plan.
@@ -135,66 +135,71 @@ class BackgroundPlanner:
         self._make_plan = make_plan
         self._tell = tell
         self._fail = fail
-        self._planning: set[asyncio.Task[None]] = set()
+        self._wanted: MakePlan | Replan | None = None
+        """What is to be planned next."""
+        self._unwanted = threading.Event()
+        """Set once nobody waits any more for what is being planned."""
+        self._planning: asyncio.Task[None] | None = None
 
     def begin(self, request: MakePlan | Replan) -> None:
         """Make that plan; whatever was planned before is superseded."""
         self.cancel()
-        work = self._plan(request) if isinstance(request, MakePlan) else self._replan(request)
-        task = asyncio.get_running_loop().create_task(work)
-        self._planning.add(task)
-        task.add_done_callback(self._planned)
+        self._wanted = request
+        if self._planning is None:
+            self._planning = asyncio.get_running_loop().create_task(self._plan_wanted())
+            self._planning.add_done_callback(self._planned)
 
     def cancel(self) -> None:
         """Nobody waits for a plan any more."""
-        for task in self._planning:
-            task.cancel()
+        self._wanted = None
+        self._unwanted.set()
 
     async def close(self) -> None:
-        """Wait until nothing is being planned that somebody could be told."""
+        """Wait until nothing is being planned."""
         self.cancel()
-        await asyncio.gather(*self._planning, return_exceptions=True)
+        if (planning := self._planning) is not None:
+            await asyncio.wait({planning}, timeout=_ENDS_S)
+            planning.cancel()
+            await asyncio.gather(planning, return_exceptions=True)
 
-    async def _plan(self, request: MakePlan) -> None:
-        def call(unwanted: ShouldStop) -> Plan:
-            return self._make_plan(request, unwanted)
-
+    async def _plan_wanted(self) -> None:
+        """Plan until nothing is wanted, one after the other."""
         try:
-            made = await _planned_beside(call, "planner")
-        except ValueError as fault:
-            self._tell(PlanFailed(request.request, str(fault)))
-        else:
-            self._tell(PlanMade(request.request, made))
+            while (request := self._wanted) is not None:
+                self._wanted, self._unwanted = None, (unwanted := threading.Event())
+                call = partial(self._outcome, request, _once_set(unwanted))
+                name = "planner" if isinstance(request, MakePlan) else "replanner"
+                outcome = await asyncio.wrap_future(call_in_background(call, name))
+                if not unwanted.is_set():
+                    self._tell(outcome)
+        finally:  # before anybody else has a turn, who would not be heard any more
+            self._planning = None
 
-    async def _replan(self, request: Replan) -> None:
-        def call(unwanted: ShouldStop) -> ReplanResult:
-            return replan(
+    def _outcome(self, request: MakePlan | Replan, unwanted: ShouldStop) -> CoordinatorEvent:
+        """Plan, on a thread of its own."""
+        if isinstance(request, Replan):
+            limit = after_time(SystemClock(), replan_limit_s(request.situation))
+            made = replan(
                 request.situation,
                 request.course,
                 request.method,
                 seed=request.seed,
-                stop=first_of(after_time(SystemClock(), REPLAN_S), unwanted),
+                stop=first_of(limit, unwanted),
                 threads=1,  # agents on this machine must not wait for a processor
             )
-
-        made = await _planned_beside(call, "replanner")
-        self._tell(Replanned(request.request, made))
+            return Replanned(request.request, made)
+        try:
+            return PlanMade(request.request, self._make_plan(request, unwanted))
+        except ValueError as fault:
+            return PlanFailed(request.request, str(fault))
 
     def _planned(self, task: asyncio.Task[None]) -> None:
-        self._planning.discard(task)
         if not task.cancelled() and (fault := task.exception()):
             self._fail(fault)
 
 
-async def _planned_beside(call: Callable[[ShouldStop], T], name: str) -> T:
-    """Plan on a thread that does not hold the process up, and learns when nobody waits for it."""
-    unwanted = threading.Event()
-    try:
-        return await asyncio.wrap_future(
-            call_in_background(lambda: call(lambda _: unwanted.is_set()), name)
-        )
-    finally:
-        unwanted.set()
+def _once_set(event: threading.Event) -> ShouldStop:
+    return lambda _: event.is_set()
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,39 +4,31 @@
 the mission when the fleet is airborne or given up, releases pop-ups when their time comes, has the
 rest planned anew where that is worth an epoch, ends the mission when nothing is left that anybody
 could do or the operator aborts it, and leaves when everybody has left.
-
-Reasons to plan anew are differences between the situation that the epoch in force answers to and
-the situation of now, so a reason that comes at a bad moment is not forgotten.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from enum import Enum
 from types import MappingProxyType
 from typing import Final
 
-import numpy as np
-
 from coordinator.core.lifecycle import (
     CoordinatorAction,
     MissionEndCondition,
-    Replan,
     Replanned,
     StartDecision,
     StartGate,
-    StopPlanning,
 )
 from coordinator.core.publication import RegisterAnnouncer, exit_status, last_epoch
-from coordinator.mission_view.wording import listed
-from coordinator.planner.online import EpochPolicy, Situation, complete_lists, worth_to_go
+from coordinator.core.replan_policy import ReplanPolicy
+from coordinator.planner.online import Situation
 from swarm.model import Mission
 from swarm.protocol.board import TaskBoard
-from swarm.protocol.calibration import noticeably_otherwise
 from swarm.protocol.events import Finish, LogLine
 from swarm.protocol.membership import Membership
-from swarm.protocol.messages import MissionPhase, PlanEpoch
+from swarm.protocol.messages import MissionPhase
 from swarm.protocol.operator_commands import abort_command, describe_command
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
@@ -277,162 +269,3 @@ class StagedMission:
     def _situation(self, now_s: float) -> Situation | None:
         present = self._membership.credible
         return Situation.of(self._board, present, self._announcer.mission_s(now_s))
-
-
-MARGIN_FRAC = 0.005
-"""Of the value still to be won; a new plan that promises less more is not worth an epoch."""
-DRIFT_FRAC = 0.05
-"""Of the time the plan still takes; UAVs that are later by more make a new plan worth a try."""
-
-
-class ReplanPolicy:
-    """The decision to plan anew, and to adopt or to discard what comes of it."""
-
-    def __init__(
-        self,
-        method: str,
-        seed: int,
-        interval_s: float,
-        *,
-        margin_frac: float = MARGIN_FRAC,
-    ) -> None:
-        self._method = method
-        self._seed = seed
-        self._interval_s = interval_s
-        self._margin_frac = margin_frac
-        self._answered: Situation | None = None
-        """What the epoch in force answers to, and every plan that was no better."""
-        self._expected_s: Mapping[str, float] = {}
-        self._under_way: Replan | None = None
-        self._request = 0
-        self._quiet_until_s: float | None = None
-
-    def begin(
-        self, situation: Situation | None, completion_s: Mapping[str, float], now_s: float
-    ) -> None:
-        """An epoch has come into force that was not made here; a plan under way is for nothing.
-
-        It answers to ``situation``; that it is unknown is a reason to plan anew. Its tasks are
-        expected to be done at ``completion_s`` [mission time].
-        """
-        self._answered, self._expected_s, self._under_way = situation, completion_s, None
-        self._quiet_until_s = now_s + self._interval_s
-
-    def is_quiet(self, now_s: float) -> bool:
-        """Whether nothing can be wanted by now, whatever has happened."""
-        if self._quiet_until_s is not None and self._quiet_until_s <= now_s:
-            self._quiet_until_s = None
-        return self._under_way is not None or self._quiet_until_s is not None
-
-    def pursue(
-        self, situation: Callable[[], Situation | None], epoch: PlanEpoch, now_s: float
-    ) -> list[CoordinatorAction]:
-        """Have a plan made if one is `wanted`; to tell the ``situation`` takes a while."""
-        if self.is_quiet(now_s) or (found := situation()) is None:
-            return []
-        wanted = self.wanted(found, epoch, now_s)
-        return [wanted, LogLine("plans the rest", {"because": wanted.reason})] if wanted else []
-
-    def wanted(self, situation: Situation, epoch: PlanEpoch, now_s: float) -> Replan | None:
-        """The plan that is wanted, if any; its answer goes to `judge`."""
-        if self.is_quiet(now_s) or situation.is_settled:
-            return None
-        reasons = self._reasons(situation)
-        if not reasons:
-            return None
-        self._quiet_until_s = now_s + self._interval_s
-        self._request += 1
-        self._under_way = Replan(
-            self._request,
-            situation,
-            EpochPolicy.of(epoch),
-            self._method,
-            self._seed + self._request,
-            ", ".join(reasons),
-        )
-        return self._under_way
-
-    def drop(self) -> None:
-        """What is being planned comes at a bad moment; it will be wanted again."""
-        self._under_way = None
-
-    def stop(self) -> list[CoordinatorAction]:
-        """What is being planned is for nothing, whatever it turns out to be."""
-        if self._under_way is None:
-            return []
-        self._under_way = None
-        return [StopPlanning()]
-
-    def judge(
-        self, replanned: Replanned, situation: Situation, epoch: PlanEpoch, now_s: float
-    ) -> PlanEpoch | None:
-        """The next epoch; None if that plan is not wanted any more or hardly better than going on.
-
-        Both are valued from ``situation``, which is the one of now and not of when planning began.
-        """
-        wanted, plan = self._under_way, replanned.plan
-        if wanted is None or replanned.request != wanted.request:
-            return None
-        new, old = plan.prediction, plan.going_on
-        new_left, new_worth = worth_to_go(situation, new.lists)
-        old_left, old_worth = worth_to_go(situation, old.lists)
-        better = new_worth - old_worth > self._margin_frac * abs(old_worth)
-        if new_left != old_left:
-            better = new_left < old_left
-        adopted = better and not situation.is_settled
-        self._under_way, self._answered = None, wanted.situation
-        self._expected_s = new.completion_s if adopted else old.completion_s
-        if not adopted:
-            return None
-        self._quiet_until_s = now_s + self._interval_s
-        why = f": worth {new_worth:.4g} instead of {old_worth:.4g} value·s"
-        if new_left != old_left:
-            why = f": leaves out {new_left} tasks instead of {old_left}"
-        return PlanEpoch(
-            number=epoch.number + 1,
-            phase=epoch.phase,
-            rule=plan.rule,
-            sequence=plan.sequence,
-            mission_s=situation.now_s,
-            reason=wanted.reason[: 200 - len(why)] + why,
-            routes=complete_lists(situation, new.lists),
-        )
-
-    def next_deadline_s(self) -> float | None:
-        """When something may be wanted though nothing happens."""
-        return None if self._under_way is not None else self._quiet_until_s
-
-    def _reasons(self, now: Situation) -> list[str]:
-        before = self._answered
-        if before is None:
-            return ["the epoch's situation is unknown"]
-        tasks, tasks_before = set(now.problem.task_ids), set(before.problem.task_ids)
-        changes = {
-            "lost": before.taking_part - now.taking_part,
-            "back": now.taking_part - before.taking_part,
-            "appeared": tasks - tasks_before,
-            "withdrawn": now.withdrawn - before.withdrawn,
-        }
-        reasons = [f"{listed(sorted(ids), 3)} {what}" for what, ids in changes.items() if ids]
-        if otherwise := noticeably_otherwise(dict(before.rates), dict(now.rates)):
-            reasons.append(f"{listed(otherwise, 3)} flies otherwise than was known")
-        if now.zones != before.zones:
-            reasons.append("the operator has changed zones")
-        if now.failures > before.failures:
-            reasons.append("an attempt failed")
-        if self._lateness_frac(now) > DRIFT_FRAC:
-            reasons.append("the fleet is late")
-        return reasons
-
-    def _lateness_frac(self, now: Situation) -> float:
-        """Mean delay of what UAVs are doing, as a share of the time all was expected to take."""
-        left_s = max(self._expected_s.values(), default=now.now_s) - now.now_s
-        if left_s <= 0.0:
-            return 0.0
-        rows: dict[str, int] = {uav: index for index, uav in enumerate(now.problem.uav_ids)}
-        late_s = [
-            max(0.0, float(now.state.free_s[rows[uav]]) - self._expected_s[task])
-            for uav, task in now.under_way.items()
-            if task in self._expected_s
-        ]
-        return float(np.mean(late_s)) / left_s if late_s else 0.0

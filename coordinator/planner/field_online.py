@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordinator.planner.field_guided import field_guided_plan
-from coordinator.planner.options import ShouldStop, after_evaluations, first_of
+from coordinator.planner.options import ShouldStop, after_evaluations, first_of, never
 from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.rules import FIELD_RULES, GUIDED, item_lists
 from swarm.kernels.field import fly_lists, run_rule
@@ -101,15 +101,22 @@ class FieldCourse:
 
 
 def going_on(
-    standing: FieldStanding, rule: str, sequence: Sequence[str], routes: Mapping[str, Sequence[str]]
+    standing: FieldStanding,
+    rule: str,
+    sequence: Sequence[str],
+    routes: Mapping[str, Sequence[str]],
+    stop: ShouldStop = never,
 ) -> FieldCourse:
-    """What comes of it if the fleet goes on by that rule; by one unknown here, nothing."""
+    """What comes of it if the fleet goes on by that rule; by one unknown here, nothing.
+
+    Told to stop, what is not known yet is left undone.
+    """
     if rule == GUIDED:
-        return _searched(standing, item_lists(standing.problem, routes))
+        return _searched(standing, item_lists(standing.problem, routes), stop)
     if rule not in FIELD_RULES:
         return _course(standing, [()] * standing.problem.n_uav)
     state = _ranked(standing, sequence)
-    runs = run_rule(standing.problem.kernel, state, FIELD_RULES[rule])
+    runs = run_rule(standing.problem.kernel, state, FIELD_RULES[rule], lambda: stop(0.0))
     return _course(standing, runs.lists(standing.problem.n_uav))
 
 
@@ -141,10 +148,10 @@ def worth_to_go(standing: FieldStanding, routes: Mapping[str, Sequence[str]]) ->
     return course.n_left_out, course.objective
 
 
-def _searched(standing: FieldStanding, begin: Items) -> FieldCourse:
+def _searched(standing: FieldStanding, begin: Items, stop: ShouldStop = never) -> FieldCourse:
     plan = field_guided_plan(
         standing.problem,
-        stop=after_evaluations(_GOING_ON_ITERATIONS),
+        stop=first_of(stop, after_evaluations(_GOING_ON_ITERATIONS)),
         state=standing.state,
         lists=begin,
         threads=1,

@@ -12,8 +12,8 @@ from functools import partial
 import pytest
 
 from coordinator.core.active import CoordinatorCore
-from coordinator.core.lifecycle import MakePlan
-from coordinator.daemon import MissionPlanner, run_coordinator
+from coordinator.core.lifecycle import CoordinatorEvent, MakePlan, PlanMade
+from coordinator.daemon import BackgroundPlanner, MissionPlanner, run_coordinator
 from coordinator.planner.options import ShouldStop
 from swarm.bus.port import BusEvent, Sample
 from swarm.model import Mission, Plan, UavId
@@ -202,6 +202,87 @@ def test_a_plan_under_way_does_not_outlive_the_coordinator() -> None:
             may_end.set()
 
     play(scenario)
+
+
+class PlansInTurn:
+    """A planner whose plans end when they are told to, or let go, and who is told of them."""
+
+    def __init__(self) -> None:
+        self.begun: list[int] = []
+        self.ended: list[int] = []
+        self.most_at_once = 0
+        self.told: list[CoordinatorEvent] = []
+        self.faults: list[BaseException] = []
+        self.may_end = threading.Event()
+        self.planner = BackgroundPlanner(self.plan, self.told.append, self.faults.append)
+
+    def plan(self, wanted: MakePlan, unwanted: ShouldStop) -> Plan:
+        self.begun.append(wanted.request)
+        self.most_at_once = max(self.most_at_once, len(self.begun) - len(self.ended))
+        while not (unwanted(0.0) or self.may_end.wait(0.001)):
+            pass
+        self.ended.append(wanted.request)
+        return planned(wanted, unwanted)
+
+    def begin(self, *requests: int) -> None:
+        for request in requests:
+            self.planner.begin(MakePlan(request, WHOLE, "greedy", 0, {}))
+
+    @property
+    def told_of(self) -> list[int]:
+        return [event.request for event in self.told if isinstance(event, PlanMade)]
+
+
+def test_a_superseded_plan_is_stopped_and_the_newest_begins_once_it_has_ended() -> None:
+    plans = PlansInTurn()
+
+    async def scenario() -> None:
+        plans.begin(1)
+        await until(lambda: plans.begun == [1], "the first plan")
+        plans.begin(2, 3)
+        await until(lambda: plans.begun == [1, 3], "the newest plan")
+        plans.may_end.set()
+        await until(lambda: plans.told_of == [3], "what comes of it")
+        await plans.planner.close()
+
+    play(scenario)
+    assert plans.most_at_once == 1
+    assert (plans.ended, plans.told_of, plans.faults) == ([1, 3], [3], [])
+
+
+def test_a_plan_may_be_wanted_by_who_is_told_of_another() -> None:
+    plans = PlansInTurn()
+    plans.may_end.set()
+    tell = plans.told.append
+
+    def told(event: CoordinatorEvent) -> None:
+        tell(event)
+        if len(plans.told) == 1:
+            plans.begin(2)
+
+    async def scenario() -> None:
+        plans.planner = BackgroundPlanner(plans.plan, told, plans.faults.append)
+        plans.begin(1)
+        await until(lambda: plans.told_of == [1, 2], "both plans")
+
+    play(scenario)
+
+
+def test_nobody_is_told_of_a_plan_that_was_given_up_and_closing_waits_for_its_end() -> None:
+    plans = PlansInTurn()
+
+    async def scenario() -> None:
+        plans.begin(1)
+        await until(lambda: plans.begun == [1], "the plan")
+        plans.planner.cancel()
+        await plans.planner.close()
+        assert plans.ended == [1]
+        plans.begin(2)
+        await until(lambda: plans.begun == [1, 2], "a plan that is wanted again")
+        await plans.planner.close()
+
+    play(scenario)
+    assert (plans.ended, plans.told) == ([1, 2], [])
 
 
 def test_a_running_mission_is_planned_anew_beside_the_loop() -> None:

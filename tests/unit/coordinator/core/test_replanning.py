@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import pytest
 
-from coordinator.core.lifecycle import Replan, Replanned
-from coordinator.core.stages import ReplanPolicy
+from coordinator.core.lifecycle import Replan, Replanned, StopPlanning
+from coordinator.core.replan_policy import ReplanPolicy
 from coordinator.planner.online import (
     EpochPolicy,
     Lists,
@@ -189,15 +189,53 @@ def test_a_reason_during_the_interval_is_dealt_with_when_it_has_passed() -> None
     assert scene.policy.next_deadline_s() is None
 
 
-def test_there_is_one_job_at_a_time() -> None:
+def test_while_nothing_happens_the_plan_under_way_is_awaited() -> None:
     scene = Scene().lose("b")
     assert scene.wanted(6.0)
 
-    assert not scene.say("coordinator", POP_UP).wanted(7.0)
+    assert not scene.say("a", held("t1", 6.5, completion_s=16.5)).wanted(7.0)
     assert scene.policy.next_deadline_s() is None
 
-    scene.judge(12.0, GOING_ON)
-    assert scene.wanted(12.0)
+
+def test_what_happens_meanwhile_supersedes_the_plan_under_way() -> None:
+    scene = Scene().lose("b")
+    assert scene.wanted(6.0)
+    assert scene.say("coordinator", POP_UP).wanted(7.0)
+
+    assert [request.reason for request in scene.asked] == ["b lost", "b lost, late appeared"]
+    assert not scene.wanted(7.5)
+    assert scene.judge(8.0, FAR_BETTER, POOR, request=1) is None
+    assert scene.judge(8.5, FAR_BETTER, POOR) is not None
+
+
+def test_lateness_supersedes_no_plan() -> None:
+    scene = Scene().lose("b")
+    assert scene.wanted(6.0)
+
+    assert not scene.say("a", held("t1", 0.0, completion_s=60.0)).wanted(7.0)
+
+    scene.policy.drop()
+    assert scene.wanted(6.0 + INTERVAL_S)
+    assert scene.asked[-1].reason == "b lost, the fleet is late"
+
+
+def test_a_restless_fleet_gets_a_plan_all_the_same() -> None:
+    scene = Scene(fleet=[uav(f"u{n}", east_m=10.0 * n) for n in range(20)])
+    asked_s = [6.0 + 0.5 * n for n in range(18) if scene.lose(f"u{n}").wanted(6.0 + 0.5 * n)]
+
+    # For an interval each loss begins the plan anew; the last one of these is awaited.
+    assert asked_s == [6.0 + 0.5 * n for n in range(10)]
+    scene.judge(15.0, GOING_ON)
+    assert scene.wanted(15.5)
+
+
+def test_a_plan_under_way_is_stopped_once_it_is_for_nothing() -> None:
+    scene = Scene().lose("b")
+    assert scene.policy.stop() == []
+    assert scene.wanted(6.0)
+
+    assert scene.policy.stop() == [StopPlanning()]
+    assert scene.judge(7.0, FAR_BETTER, POOR) is None
 
 
 def test_after_an_epoch_the_next_waits_for_the_interval() -> None:
@@ -219,7 +257,7 @@ def test_a_reason_that_has_been_judged_is_no_reason_again() -> None:
     assert not scene.wanted(20.0)
 
 
-def test_a_change_during_planning_is_a_reason_for_the_next() -> None:
+def test_a_change_that_nobody_looked_at_during_planning_is_a_reason_for_the_next() -> None:
     scene = Scene().lose("b")
     assert scene.wanted(6.0)
     scene.lose("c")
