@@ -1,16 +1,20 @@
-"""The commands `swarm bench turnaround`, `autopilot`, `dashboard` and `missions`.
+"""The commands `swarm bench turnaround`, `autopilot`, `dashboard`, `missions` and `replan`.
 
 They measure how long things take, and how much one process carries.
 """
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from sim.bench.command_line import (
+    LONGEST_S,
+    SEED,
     ValleyArgument,
+    check_files,
     each,
     integer,
     launch_options,
@@ -18,6 +22,7 @@ from sim.bench.command_line import (
     require_proc,
     show,
     size_of,
+    write_file,
 )
 from sim.options import ChanceOptions
 from swarm.runtime.option_groups import option_of
@@ -260,4 +265,61 @@ def missions(
             lambda flown: bar.advance(flying, flown),
         )
     show(done, json=json)
+    return 0
+
+
+def replan(
+    sizes: Annotated[
+        str, typer.Option("--sizes", metavar="NxM,…", help="UAVs and tasks of the random missions.")
+    ] = "50x500,200x5000",
+    seeds: Annotated[
+        str, typer.Option("--seeds", metavar="K,…", help="Seeds of missions and of the search.")
+    ] = "0",
+    long_run_s: Annotated[
+        float,
+        typer.Option(
+            "--long-run-s",
+            min=0.1,
+            max=LONGEST_S,
+            metavar="S",
+            help="How long to search for a yardstick.",
+        ),
+    ] = 60.0,
+    json: JsonOption = False,
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "--out", metavar="FILE", help="Write the result here, too.", show_default=False
+        ),
+    ] = None,
+) -> int:
+    """Time re-plans of running missions, and what they gain.
+
+    30% of the UAVs are lost and 30% of the tasks appear, at the start or when half of the known
+    tasks are done. From there the rest is planned anew as the coordinator does it; also, it is
+    given up at five moments, and timed how long it goes on.
+
+    Examples:
+        swarm bench replan
+        swarm bench replan --sizes 50x500 --seeds 0,1,2 --long-run-s 20 --json
+        swarm bench replan --out replans.txt
+    """
+    from rich.console import Console
+
+    from sim.bench.replans import measure_replans
+    from swarm.runtime.clock import SystemClock
+
+    check_files(None, out)
+    wanted = each("--sizes", sizes, size_of)
+    chosen = each("--seeds", seeds, SEED)
+    with progress() as tell:
+        done = measure_replans(wanted, chosen, SystemClock(), unhurried_s=long_run_s, progress=tell)
+    show(done, json=json)
+    if out is not None:
+
+        def write(path: Path) -> None:
+            with path.open("w", encoding="utf-8") as file:
+                Console(file=file, width=100).print(done)
+
+        write_file("--out", out, write)
     return 0

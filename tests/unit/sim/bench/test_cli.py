@@ -61,6 +61,20 @@ def test_decide_times_decisions(capsys: pytest.CaptureFixture[str]) -> None:
     assert "One online decision at 3 × 9" in capsys.readouterr().out
 
 
+def test_replan_tells_programs_people_and_a_file(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "replans.txt"
+    arguments = ("replan", "--sizes", "3x8", "--seeds", "1", "--long-run-s", "0.1")
+
+    assert swarm(*arguments, "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert [(row["moment"], row["seed"]) for row in told["times"]] == [("start", 1), ("midway", 1)]
+    assert swarm(*arguments, "--out", str(out)) == 0
+    assert "midway" in capsys.readouterr().out
+    assert "3×8" in out.read_text(encoding="utf-8")
+
+
 def test_missions_flies_them_in_one_process_or_several_alike(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
