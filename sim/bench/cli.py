@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +12,7 @@ import typer
 from sim.bench.command_line import (
     LONGEST_S,
     SEED,
+    Reader,
     check_files,
     each,
     limit_of,
@@ -40,6 +43,7 @@ if TYPE_CHECKING:
     from sim.bench.solvers import MissionSource
 
 _DEFAULT_SIZES = "10x50,50x500"
+_FIELD_SIZES = "50x500"
 _SCALING_SIZES = "10x50,10x500,50x500,50x2000,100x1000,200x2000,200x5000"
 bench = typer.Typer(
     help="Benchmarks, each printing machine, seeds and ratios.",
@@ -100,6 +104,13 @@ def plan(
             show_default=False,
         ),
     ] = None,
+    field: Annotated[
+        bool,
+        typer.Option(
+            "--field",
+            help="Random missions with batteries, bases, zones and windows, 50 × 500 by default.",
+        ),
+    ] = False,
     scaling: Annotated[
         bool,
         typer.Option(
@@ -136,6 +147,7 @@ def plan(
         swarm bench plan
         swarm bench plan --sizes 20x100 --time-limit-s 1,3,10 --plot value.png
         swarm bench plan valley-survey --methods guided,cbba,exact --json
+        swarm bench plan --field --methods guided,ortools-warm --time-limit-s 10,60
         swarm bench plan --scaling --out scaling.md
     """
     from sim.bench.plan_report import (
@@ -147,16 +159,25 @@ def plan(
         write_figure,
     )
     from sim.bench.plans import measure_plans
-    from sim.bench.solvers import METHODS
+    from sim.bench.solvers import MissionSource, methods_for
 
     limits_s = each("--time-limit-s", time_limit_s, limit_of)
     all_seeds = each("--seeds", seeds, SEED)
-    default_methods = "guided,greedy" if scaling else ",".join(METHODS)
-    names = each("--methods", methods or default_methods, _method)
+    known = methods_for(MissionSource(field=field))
+    default_methods = "guided,greedy" if scaling else ",".join(known)
+    names = each("--methods", methods or default_methods, _one_of(known))
     check_files(plot, out)
     if scaling:
         limits_s, all_seeds = limits_s[:1], all_seeds[:1]
-    sources = _sources(scenario, sizes, _SCALING_SIZES if scaling else _DEFAULT_SIZES)
+    if field and (scenario is not None or scaling):
+        other = "SCENARIO" if scenario is not None else "--scaling"
+        problem = f"it draws random missions, and compares methods; {other} does not go with it"
+        raise InputError(Fault("--field", "", problem, "leave one of them out"))
+    default_sizes = _FIELD_SIZES if field else _SCALING_SIZES if scaling else _DEFAULT_SIZES
+    sources = [
+        (name, replace(source, field=field))
+        for name, source in _sources(scenario, sizes, default_sizes)
+    ]
     if methods is not None and any(name.startswith("ortools") for name in names):
         from sim.study.baselines.ortools_routing import require_installed
 
@@ -229,10 +250,13 @@ def _sources(
     return found
 
 
-def _method(flag: str, word: str) -> str:
-    from sim.bench.solvers import METHODS
+def _one_of(known: Collection[str]) -> Reader[str]:
+    """Reads names of methods."""
 
-    if word not in METHODS:
-        remedy = remedy_for_name(word, METHODS, "choose among")
-        raise InputError(Fault(flag, word, "no such method", remedy))
-    return word
+    def read(flag: str, word: str) -> str:
+        if word not in known:
+            remedy = remedy_for_name(word, known, "choose among")
+            raise InputError(Fault(flag, word, "no such method", remedy))
+        return word
+
+    return read

@@ -17,7 +17,8 @@ from rich.text import Text
 
 from sim.bench.plans import LONG_RUN, MethodSummary, PlanBench, PlanMeasurement, summaries
 from sim.bench.results import BenchResult
-from sim.bench.solvers import HORIZON_SHARE, METHODS
+from sim.bench.solvers import HORIZON_SHARE, METHODS, MissionSource, methods_for
+from sim.study.baselines import ortools_field
 from sim.study.baselines.ortools_routing import SHORTFALL
 from swarm.runtime.table import Column, ResultTable
 
@@ -40,6 +41,16 @@ _MEASURED = (
     "wall time; imports are not counted, and OR-Tools' building of its model comes on top of its "
     "limit. peak: memory of the whole process, interpreter and mission included. late: tasks "
     "completed after D. guided and greedy use every core, the others one."
+)
+
+_FIELD = (
+    "Random missions in the field: UAVs, places, values and services as in plain ones of the same "
+    "size, p = 1 and survival 1; batteries, less their reserve, last for 40 % of the mean list, "
+    "two bases without a limit of slots, swaps of 15 s, four zones, half of the tasks begin in a "
+    "window; D = 1.2 × what the mission takes by value per time. Plans compare by (fewest tasks "
+    "left out, then J), all flown by the evaluator of plans; broken: tasks that could not be done "
+    "where their list has them. Then base visits are chosen anew, the best for the list's order, "
+    "and only tasks for which there are none are dropped."
 )
 
 _SCALING_TITLE = "Time and memory by size"
@@ -68,10 +79,10 @@ def comparison_grids(bench: PlanBench) -> list[ResultTable]:
             Column("time", _duration, "s"),
             Column("CPU", ".1f", "s"),
             Column("peak", ".0f", "MiB", 1 / _MIB),
-            Column("late"),
+            *([Column("left out", ".1f"), Column("broken")] if bench.field else [Column("late")]),
             Column("notes", words=True),
         ]
-        found_rows = [_comparison_row(row, long_run is not None) for row in rows]
+        found_rows = [_comparison_row(row, long_run is not None, bench.field) for row in rows]
         grids.append(ResultTable(columns, found_rows, f"{case}, {limit_s:g} s"))
     return grids
 
@@ -145,11 +156,13 @@ class PlanReport(BenchResult):
         return "\n\n".join([about, *tables, *_notes(self.bench, self.grids)]) + "\n"
 
 
-def _comparison_row(summary: MethodSummary, with_long_run: bool) -> tuple[object, ...]:
+def _comparison_row(
+    summary: MethodSummary, with_long_run: bool, in_field: bool
+) -> tuple[object, ...]:
     if not summary.runs:
-        return (summary.method, *[None] * (7 if with_long_run else 6), summary.note)
+        return (summary.method, *[None] * (6 + with_long_run + in_field), summary.note)
     notes = summary.note
-    if summary.unassigned:
+    if summary.unassigned and not in_field:
         notes += f"; {summary.unassigned} tasks on no list"
     return (
         summary.method,
@@ -159,7 +172,7 @@ def _comparison_row(summary: MethodSummary, with_long_run: bool) -> tuple[object
         summary.elapsed_s,
         summary.cpu_s,
         summary.peak_bytes,
-        summary.late,
+        *((summary.left_out, summary.broken) if in_field else (summary.late,)),
         notes,
     )
 
@@ -175,13 +188,16 @@ def _duration(time_s: float) -> str:
 def _notes(bench: PlanBench, grids: Sequence[ResultTable]) -> list[str]:
     """What the figures mean, as far as it concerns methods and cases that are there."""
     methods = list(dict.fromkeys(row.method for row in bench.measured))
-    told = [f"{name}: {METHODS[name].what}" for name in methods if name in METHODS]
+    known = methods_for(MissionSource(field=bench.field))
+    told = [f"{name}: {known[name].what}" for name in methods if name in known]
     notes = [_MEASURED, "; ".join(told) + "."]
     if any(grid.title == _SCALING_TITLE for grid in grids):
         notes.append(_SCALING)
     if any(name.startswith("ortools") for name in methods):
-        notes.append(SHORTFALL)
-    if any(_SIZE.fullmatch(row.case) for row in bench.measured):
+        notes.append(ortools_field.LEFT_OUT if bench.field else SHORTFALL)
+    if bench.field:
+        notes.append(_FIELD)
+    elif any(_SIZE.fullmatch(row.case) for row in bench.measured):
         notes.append(_RANDOM)
     return notes
 
@@ -294,7 +310,8 @@ def _lowest(found: Sequence[MethodSummary]) -> float:
 
 
 def _look(name: str) -> dict[str, Any]:
-    place = list(METHODS).index(name)
+    names = list(dict.fromkeys([*METHODS, *methods_for(MissionSource(field=True))]))
+    place = names.index(name)
     return {"color": _COLOURS[place % len(_COLOURS)], "marker": _MARKERS[place % len(_MARKERS)]}
 
 

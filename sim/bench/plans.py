@@ -12,16 +12,18 @@ import numpy as np
 
 from sim.bench.machine import MachineInfo, this_machine
 from sim.bench.results import Progress, unheard
+from sim.bench.field_score import score_in_field
 from sim.bench.solvers import (
-    METHODS,
     MissionSource,
     PlanningJob,
     PlanningRun,
     TracePoint,
+    methods_for,
     problem_of,
     run_in_subprocess,
 )
 from swarm.allocation import evaluate
+from swarm.allocation.field import FieldProblem
 from swarm.allocation.problem import Problem
 from swarm.runtime.errors import SwarmError
 
@@ -41,13 +43,18 @@ class PlanMeasurement:
     objective: float | None = None
     """J [value·s]; None if there are no lists."""
     ratio: float | None = None
-    """J over the best J of all methods on this mission in this run, long run apart."""
+    """J over that of the best plan of all methods on this mission in this run, long run apart; in
+    the field it may be above 1 where more is left out."""
     ratio_long: float | None = None
     """J over that of the long run; None without one."""
     unassigned: int = 0
     """Tasks on no list though some UAV is capable of them."""
     late: int = 0
     """Tasks completed after D, whose terms are negative."""
+    left_out: int = 0
+    """In the field: tasks without due_s that are not done. Fewer of them go before J."""
+    broken: int = 0
+    """In the field: tasks on its lists that could not be done there, and were dropped or moved."""
     elapsed_s: float = 0.0
     cpu_s: float = 0.0
     peak_bytes: int = 0
@@ -63,6 +70,8 @@ class PlanBench:
 
     machine: MachineInfo
     measured: tuple[PlanMeasurement, ...]
+    field: bool = False
+    """Whether the missions have the field's constraints; then all have."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +96,10 @@ class MethodSummary:
     unassigned: int
     """Largest."""
     late: int
+    """Largest."""
+    left_out: float
+    """Mean."""
+    broken: int
     """Largest."""
     note: str
     """Of the first seed."""
@@ -116,7 +129,8 @@ def measure_plans(
         for seed in seeds:
             drawn = source if source.scenario is not None else replace(source, seed=seed)
             problem = problem_of(drawn)
-            drawn = replace(drawn, horizon_s=problem.horizon_s)
+            if not drawn.field:  # so that it need not be found out again
+                drawn = replace(drawn, horizon_s=problem.horizon_s)
             here: list[PlanMeasurement] = []
             for limit_s in limits_s:
                 for name in methods:
@@ -128,7 +142,7 @@ def measure_plans(
                 job = PlanningJob(drawn, "guided", long_run_s, seed)
                 here.append(_measured(case, problem, job, LONG_RUN, run))
             rows += _with_ratios(here)
-    return PlanBench(machine, tuple(rows))
+    return PlanBench(machine, tuple(rows), any(source.field for _, source in sources))
 
 
 def summaries(bench: PlanBench) -> list[MethodSummary]:
@@ -140,9 +154,9 @@ def summaries(bench: PlanBench) -> list[MethodSummary]:
 
 
 def _measured(
-    case: str, problem: Problem, job: PlanningJob, name: str, run: Runner
+    case: str, problem: Problem | FieldProblem, job: PlanningJob, name: str, run: Runner
 ) -> PlanMeasurement:
-    refusal = METHODS[job.method].refusal
+    refusal = methods_for(job.source)[job.method].refusal
     refused = None if refusal is None else refusal(problem, job.limit_s)
     blank = PlanMeasurement(case, job.seed, name, job.limit_s, note=refused or "")
     if refused is not None:
@@ -151,12 +165,18 @@ def _measured(
         answer = run(job)
     except SwarmError as error:
         return replace(blank, note=str(error))
-    objective, completion_s = evaluate(problem, answer.routes)
     wanted = problem.capable.any(axis=0)
     if not any(answer.routes) and wanted.any():
         return replace(blank, elapsed_s=answer.elapsed_s, note="no lists in time")
+    row = blank
+    if isinstance(problem, FieldProblem):
+        done = score_in_field(problem, answer.routes)
+        objective, completion_s = done.objective, done.end_s
+        row = replace(row, left_out=done.left_out, broken=done.broken)
+    else:
+        objective, completion_s = evaluate(problem, answer.routes)
     return replace(
-        blank,
+        row,
         objective=objective,
         unassigned=int((wanted & np.isnan(completion_s)).sum()),
         late=int((completion_s > problem.horizon_s).sum()),
@@ -171,9 +191,13 @@ def _measured(
 
 def _with_ratios(rows: Sequence[PlanMeasurement]) -> list[PlanMeasurement]:
     """The rows of one mission, compared with each other."""
-    worths = [r.objective for r in rows if r.objective is not None and r.method != LONG_RUN]
+    worths = [
+        (-r.left_out, r.objective)
+        for r in rows
+        if r.objective is not None and r.method != LONG_RUN
+    ]
     long_runs = [r.objective for r in rows if r.method == LONG_RUN]
-    best = max(worths, default=None)
+    best = max(worths)[1] if worths else None
     long_run = long_runs[0] if long_runs else None
     return [
         replace(row, ratio=_ratio(row.objective, best), ratio_long=_ratio(row.objective, long_run))
@@ -206,6 +230,8 @@ def _summary(rows: Sequence[PlanMeasurement]) -> MethodSummary:
         peak_bytes=max((row.peak_bytes for row in done), default=0),
         unassigned=max((row.unassigned for row in rows), default=0),
         late=max((row.late for row in rows), default=0),
+        left_out=_mean([row.left_out for row in done]) or 0.0,
+        broken=max((row.broken for row in rows), default=0),
         note=next((row.note for row in rows if row.objective is None), first.note),
     )
 

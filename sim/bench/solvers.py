@@ -11,12 +11,12 @@ import json
 import os
 import subprocess
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -28,6 +28,9 @@ from swarm.allocation.problem import Problem
 from swarm.runtime.clock import Clock, SystemClock
 from swarm.runtime.errors import SwarmError
 from swarm.scenario import load_scenario
+
+if TYPE_CHECKING:
+    from swarm.allocation.field import FieldProblem
 
 TracePoint = tuple[float, float]
 """Seconds since the start, and the best J found by then [value·s]."""
@@ -50,24 +53,26 @@ class PlanningResult:
     """How its best J grew, for methods that can be stopped at any time."""
 
 
-Solver = Callable[[Problem, float, int, Clock], PlanningResult]
+P = TypeVar("P")
+SolverOf = Callable[[P, float, int, Clock], PlanningResult]
 """Of (problem, time limit [s], seed, clock)."""
+Solver = SolverOf[Problem]
 
 
 @dataclass(frozen=True, slots=True)
-class PlanningMethod:
-    """One way to plan."""
+class PlanningMethod(Generic[P]):
+    """One way to plan problems of a kind."""
 
     name: str
     what: str
     """In a few words, for people."""
-    load: Callable[[], Solver]
-    refusal: Callable[[Problem, float], str | None] | None = None
+    load: Callable[[], SolverOf[P]]
+    refusal: Callable[[P, float], str | None] | None = None
     """Why it cannot do this problem within this limit [s], or None if it can; None if it always
     can."""
 
 
-class _Trace:
+class Trace:
     """Collects how the best J grows; at most a point every hundredth of the limit."""
 
     def __init__(self, clock: Clock, limit_s: float) -> None:
@@ -98,7 +103,7 @@ def _load_guided() -> Solver:
     from coordinator.planner.plan import guided_plan
 
     def solve(problem: Problem, limit_s: float, seed: int, clock: Clock) -> PlanningResult:
-        trace = _Trace(clock, limit_s)
+        trace = Trace(clock, limit_s)
         stop = after_time(clock, limit_s)
         plan = guided_plan(problem, seed=seed, stop=stop, progress=trace)
         return PlanningResult(plan.routes, f"{plan.iterations} iterations", tuple(trace.points))
@@ -114,7 +119,7 @@ def _load_greedy() -> Solver:
 
     def solve(problem: Problem, limit_s: float, seed: int, clock: Clock) -> PlanningResult:
         rule = kernel_rule("greedy")
-        trace = _Trace(clock, limit_s)
+        trace = Trace(clock, limit_s)
         stop = after_time(clock, limit_s)
         rng = np.random.default_rng(seed)
         search = best_sequence(problem, rule, rng, stop, progress=trace)
@@ -186,7 +191,7 @@ def _ortools_refusal(problem: Problem, limit_s: float) -> str | None:
     return None
 
 
-METHODS: dict[str, PlanningMethod] = {
+METHODS: dict[str, PlanningMethod[Problem]] = {
     method.name: method
     for method in (
         PlanningMethod("guided", "lists by the route optimiser", _load_guided),
@@ -232,6 +237,8 @@ class MissionSource:
     seed: int = 0
     horizon_s: float | None = None
     """D, where it is known already [s]."""
+    field: bool = False
+    """Whether a random mission has the field's constraints, as `sim.bench.field_methods` has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -240,7 +247,7 @@ class PlanningJob:
 
     source: MissionSource
     method: str
-    """One of `METHODS`."""
+    """One of `methods_for` its source."""
     limit_s: float
     seed: int
 
@@ -250,6 +257,7 @@ class PlanningRun:
     """What came of it."""
 
     routes: list[list[int]]
+    """Task indices per UAV; in the field items."""
     elapsed_s: float
     """From the problem's arrays to lists; imports are done before [s]."""
     cpu_s: float
@@ -263,8 +271,26 @@ class PlanningRun:
     """See `PlanningResult`."""
 
 
-def problem_of(source: MissionSource) -> Problem:
+def methods_for(source: MissionSource) -> Mapping[str, PlanningMethod[Any]]:
+    """Those that can be compared on it, by name, in the order of tables."""
+    if not source.field:
+        return METHODS
+    from sim.bench.field_methods import FIELD_METHODS
+
+    return FIELD_METHODS
+
+
+def problem_of(source: MissionSource) -> Problem | FieldProblem:
     """The mission's arrays; pop-ups are unknown to a plan."""
+    if source.field:
+        from sim.bench.field_methods import bench_problem
+
+        return bench_problem(source.n_uav, source.n_task, source.seed)
+    return plain_problem_of(source)
+
+
+def plain_problem_of(source: MissionSource) -> Problem:
+    """The same of a mission without the field's constraints."""
     if source.scenario is not None:
         return Problem.from_mission(load_scenario(Path(source.scenario)).known_at_start())
     if source.horizon_s is not None:
@@ -277,7 +303,7 @@ def problem_of(source: MissionSource) -> Problem:
 def run_job(job: PlanningJob, clock: Clock) -> PlanningRun:
     """Run a job in this process."""
     problem = problem_of(job.source)
-    solve = METHODS[job.method].load()
+    solve = methods_for(job.source)[job.method].load()
     base_bytes = peak_memory_bytes()
     begin_cpu_s, begin_s = _cpu_s(), clock.now_s()
     solved = solve(problem, job.limit_s, job.seed, clock)

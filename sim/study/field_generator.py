@@ -197,8 +197,14 @@ def _within_reach(
         replace(mission.tasks[0], id=TaskId(f"p{k}"), position_enu_m=(*place, 0.0))
         for k, place in enumerate(places)
     ]
-    needs_s = np.sort(_sortie_s(FieldProblem.from_mission(mission, tasks=every)), axis=0)
-    half_s = needs_s[len(mission.uavs) // 2] + longest_s
+    needs_s = np.concatenate(  # few at a time: legs between all of them would fit nowhere
+        [
+            _sortie_s(FieldProblem.from_mission(mission, tasks=every[first : first + count]))
+            for first in range(0, len(every), count)
+        ],
+        axis=1,
+    )
+    half_s = np.sort(needs_s, axis=0)[len(mission.uavs) // 2] + longest_s
     for _ in range(_ROUNDS):
         budget_s = shape.endurance_frac * _list_s(replace(mission, tasks=at(kept)))
         near = np.flatnonzero(half_s <= budget_s)[:count].tolist()

@@ -220,24 +220,43 @@ bool ListSolver::can_do(const FieldList& list, const Stays& stays, int task) {
 // A place is valued in three steps, each ending it if the bound is not above the best gain so far:
 // by earliest times alone, with the labels after the new task, and with those after each task that
 // follows.
-Insertion ListSolver::best_place(FieldList& list, const Stays& stays, int task, double least,
+Insertion ListSolver::best_place(FieldList& list, const Stays& stays, int task,
                                  bool& meets_slots) {
+    bounds_.clear();
+    bound_places(list, task, bounds_);
+    std::make_heap(bounds_.begin(), bounds_.end());
     Insertion best;
-    if (list.value == -kInfinity) return best;
+    while (!bounds_.empty() && bounds_.front().gain > best.gain) {
+        std::pop_heap(bounds_.begin(), bounds_.end());
+        Insertion next = bounds_.back();
+        bounds_.pop_back();
+        next.gain = gain_at(list, stays, next.place, task, best.gain, meets_slots);
+        if (next.gain > best.gain) best = next;
+    }
+    return best;
+}
+
+void ListSolver::bound_places(FieldList& list, int task, std::vector<Insertion>& bounds) {
+    if (list.value == -kInfinity) return;
     learn(list);
-    most_.clear();
     for (std::size_t place = 0; place <= list.order.size(); ++place)
-        most_.push_back(most_with(list, place, task));
-    steps += static_cast<std::int64_t>(most_.size());
-    while (true) {
-        const auto next = std::max_element(most_.begin(), most_.end());
-        const double above = list.value + std::max(least, best.gain);
-        if (!(*next > above)) return best;
-        const std::size_t place = static_cast<std::size_t>(next - most_.begin());
-        *next = -kInfinity;
-        const double gain =
-            value_with(list, stays, place, task, above, meets_slots) - list.value;
-        if (gain > best.gain) best = {gain, place};
+        bounds.push_back({most_with(list, place, task) - list.value, place, list.uav});
+    steps += static_cast<std::int64_t>(list.order.size()) + 1;
+}
+
+double ListSolver::gain_at(const FieldList& list, const Stays& stays, std::size_t place, int task,
+                           double least, bool& meets_slots) {
+    const double above = list.value + least;
+    return value_with(list, stays, place, task, above, meets_slots) - list.value;
+}
+
+void ListSolver::fetch(const FieldList& list, int task) const {
+    const int enter = problem_.enter_node(item_of_task(task, 0));
+    const double* legs_s = problem_.legs_from(list.uav, enter);
+    for (const Item item : list.order) {
+        const int node = problem_.enter_node(item);
+        __builtin_prefetch(legs_s + node);
+        __builtin_prefetch(problem_.legs_from(list.uav, problem_.leave_node(item)) + enter);
     }
 }
 

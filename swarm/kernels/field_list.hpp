@@ -91,10 +91,17 @@ struct FieldList {
     std::uint64_t known = 0;
 };
 
-// A task's best place on a list.
+// What a task gains at a place of a list.
 struct Insertion {
     double gain = -std::numeric_limits<double>::infinity();
     std::size_t place = 0;
+    int uav = -1;
+
+    // The smaller index first of what gains as much.
+    bool operator<(const Insertion& other) const {
+        if (gain != other.gain) return gain < other.gain;
+        return uav != other.uav ? uav > other.uav : place > other.place;
+    }
 };
 
 // Solves lists; has the room it needs to work.
@@ -116,9 +123,19 @@ class ListSolver {
     // Whether `task` can be done by a UAV alone; its list is empty.
     bool can_do(const FieldList& list, const Stays& stays, int task);
 
-    // Where `task` gains most, if that is more than `least`; else any gain up to that may be told.
-    Insertion best_place(FieldList& list, const Stays& stays, int task, double least,
-                         bool& meets_slots);
+    // Where `task` gains most.
+    Insertion best_place(FieldList& list, const Stays& stays, int task, bool& meets_slots);
+
+    // Append what `task` gains at most at every place of the list.
+    void bound_places(FieldList& list, int task, std::vector<Insertion>& bounds);
+
+    // What `task` gains at that place of a list whose places were bounded, if that is more than
+    // `least`; else -infinity.
+    double gain_at(const FieldList& list, const Stays& stays, std::size_t place, int task,
+                   double least, bool& meets_slots);
+
+    // Have at hand soon what bounding the places takes.
+    void fetch(const FieldList& list, int task) const;
 
     // The same list under other stays: its labels and value anew, but no other bases. Where it can't
     // be done under these its value is -infinity.
@@ -153,7 +170,7 @@ class ListSolver {
     std::vector<Progress> ready_;  // after a swap at each base
     std::vector<int> before_;      // the base before that one; -1: none, -2: can't be reached
     std::vector<ListLabel> here_, next_;
-    std::vector<double> most_;     // by place, what a task could make the list worth there
+    std::vector<Insertion> bounds_;
     Random* random_ = nullptr;
     double overlooks_ = 0.0;
     FieldList before_refresh_;

@@ -261,6 +261,7 @@ bool FieldLane::fly() {
 }
 
 void FieldLane::fly_together() {
+    if (!any_limited_) return;  // then lists are worth what their labels say
     while (!fly()) {
         const int uav = *std::find_if(uavs_.begin(), uavs_.end(), [&](int each) {
             return flights_.flight(each).refusal != Refusal::kNone;
@@ -291,24 +292,81 @@ void FieldLane::remove(int uav, std::size_t from, std::size_t count) {
 
 FieldLane::Known& FieldLane::known(int uav, int task) { return known_[problem_.at(uav, task)]; }
 
-bool FieldLane::still_known(int uav, const Known& known) const {
-    const bool same = !precise_ || !known.meets_slots || known.stays == stays_.version();
-    return known.list == lists_[uav].version && same;
-}
-
-// Where a list would take a task best, if that gains more than `least`.
-Insertion FieldLane::best_place(int uav, int task, double least) {
+// What is known of a task on a list: as good as nothing if the list has changed since.
+FieldLane::Known& FieldLane::known_now(int uav, int task) {
     FieldList& list = lists_[uav];
     if (precise_) solver_.refresh(list, stays_);
-    Known& here = known(uav, task);
-    if (still_known(uav, here) && (here.best.gain >= here.most || here.most <= least))
-        return here.best;
-    here.list = list.version;
-    here.stays = stays_.version();
-    here.meets_slots = list.meets_slots;
-    here.best = solver_.best_place(list, stays_, task, least, here.meets_slots);
-    here.most = std::max(here.best.gain, least);
-    return here.best;
+    Known& here = known_[problem_.at(uav, task)];
+    const bool same = !precise_ || !here.meets_slots || here.stays == stays_.version();
+    if (here.list != list.version || !same) {
+        here = Known{};
+        here.list = list.version;
+        here.stays = stays_.version();
+        here.meets_slots = list.meets_slots;
+    }
+    return here;
+}
+
+// Where a list would take a task best.
+Insertion FieldLane::best_place(int uav, int task) {
+    Known& here = known_now(uav, task);
+    if (!here.exact) {
+        const Insertion best = solver_.best_place(lists_[uav], stays_, task, here.meets_slots);
+        here.most = best.gain;
+        here.place = best.place;
+        here.exact = true;
+    }
+    return {here.most, here.place, uav};
+}
+
+// Where the lists asked would take a task best, if that gains more than `least`: the place with the
+// highest bound of all is valued first.
+Insertion FieldLane::best_place(int task, double least) {
+    Insertion best{least};
+    const auto offer = [&](const Insertion& one) {
+        if (one.gain > least && best < one) best = one;
+    };
+    std::size_t doubtful = 0;
+    for (const int uav : asked_) {
+        const Known& here = known_now(uav, task);
+        if (here.exact) {
+            offer({here.most, here.place, uav});
+        } else {
+            asked_[doubtful++] = uav;
+        }
+    }
+    asked_.resize(doubtful);
+    for (const int uav : asked_) {
+        if (known(uav, task).most > best.gain) solver_.fetch(lists_[uav], task);
+    }
+    bounds_.clear();
+    for (const int uav : asked_) {
+        Known& here = known(uav, task);
+        if (!(here.most > best.gain)) continue;
+        const std::size_t first = bounds_.size();
+        solver_.bound_places(lists_[uav], task, bounds_);
+        here.most = -kInfinity;
+        for (std::size_t k = first; k < bounds_.size(); ++k)
+            here.most = std::max(here.most, bounds_[k].gain);
+        if (here.most > best.gain) continue;
+        bounds_.resize(first);
+    }
+    std::make_heap(bounds_.begin(), bounds_.end());
+    while (!bounds_.empty() && bounds_.front().gain > best.gain) {
+        std::pop_heap(bounds_.begin(), bounds_.end());
+        Insertion next = bounds_.back();
+        bounds_.pop_back();
+        Known& here = known(next.uav, task);
+        next.gain = solver_.gain_at(lists_[next.uav], stays_, next.place, task, best.gain,
+                                    here.meets_slots);
+        offer(next);
+    }
+    // Of no place was it found, or does its bound allow, that it gains more than the best.
+    for (const int uav : asked_) {
+        Known& here = known(uav, task);
+        here.most = std::min(here.most, best.gain);
+    }
+    return best;
 }
 
 void FieldLane::insert(int uav, std::size_t place, int task) {
@@ -323,26 +381,12 @@ void FieldLane::insert(int uav, std::size_t place, int task) {
 }
 
 bool FieldLane::put_back(int task) {
-    double best = problem_.required[task] ? -kInfinity : 0.0;
-    int best_uav = -1;
-    std::size_t best_at = 0;
     asked_.clear();
     for (const int uav : able_[task])
         if (random_.uniform() >= kListBlink) asked_.push_back(uav);
-    // Lists of which it is known first: what they gain spares the others most of the work.
-    for (const bool still : {true, false}) {
-        for (const int uav : asked_) {
-            if (still_known(uav, known(uav, task)) != still) continue;
-            const Insertion insertion = best_place(uav, task, best);
-            if (insertion.gain > best) {
-                best = insertion.gain;
-                best_uav = uav;
-                best_at = insertion.place;
-            }
-        }
-    }
-    if (best_uav < 0) return false;
-    insert(best_uav, best_at, task);
+    const Insertion best = best_place(task, problem_.required[task] ? -kInfinity : 0.0);
+    if (best.uav < 0) return false;
+    insert(best.uav, best.place, task);
     return true;
 }
 
@@ -393,7 +437,7 @@ void FieldLane::put_back_by_regret() {
             double first = problem_.required[task] ? -prize_ : 0.0, second = first;
             bool any = false;
             for (const int uav : able_[task]) {
-                const double gain = best_place(uav, task, -kInfinity).gain;
+                const double gain = best_place(uav, task).gain;
                 any = any || gain > -kInfinity;
                 if (gain > first) {
                     second = first;

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <utility>
 #include <vector>
@@ -50,8 +51,10 @@ class FieldLane {
     struct Known {
         std::uint64_t list = 0, stays = 0;
         bool meets_slots = false;
-        Insertion best;
-        double most = 0.0;  // no place gains more than that
+        double most = std::numeric_limits<double>::infinity();  // no place gains more than that;
+                                                                // this one does if it is exact
+        bool exact = false;
+        std::size_t place = 0;
     };
 
     void find_doable();
@@ -69,8 +72,9 @@ class FieldLane {
     bool put_back(int task);
     void put_back_by_regret();
     Known& known(int uav, int task);
-    bool still_known(int uav, const Known& known) const;
-    Insertion best_place(int uav, int task, double least);
+    Known& known_now(int uav, int task);
+    Insertion best_place(int uav, int task);
+    Insertion best_place(int task, double least);
     void insert(int uav, std::size_t place, int task);
     void remove(int uav, std::size_t from, std::size_t count);
     void settle(int uav, std::size_t kept, double overlooks = 0.0);
@@ -108,6 +112,7 @@ class FieldLane {
     std::size_t placed_ = 0;              // tasks that had their first turn
     std::vector<Known> known_;            // (n_uav, n_task)
     std::vector<int> asked_;
+    std::vector<Insertion> bounds_;  // a heap
     std::vector<Times> times_;
     std::vector<Stay> own_stays_;
     double scale_ = 0.0;

@@ -1,0 +1,277 @@
+"""Routing with OR-Tools under the field's constraints: batteries, bases, zones, windows, due times.
+
+The whole model is written down in README.md beside this file. It states J and all limits but for
+what `LEFT_OUT` says; missions that it has no words for are refused by `refusal`. OR-Tools is an
+optional extra (``peckorder[bench]``), imported when used.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from sim.study.baselines.ortools_routing import is_installed
+from swarm.allocation.field import FieldProblem
+from swarm.allocation.problem import FloatArray, IntArray
+
+LEFT_OUT = (
+    "OR-Tools in the field: J is stated exactly, up to weights rounded to a 10000th of the largest "
+    "and times to milliseconds, plus a share of the travel, without which its guided local search "
+    "has nothing to penalise. Limits are 10 ms wider than they are. What breaks them is dropped."
+)
+"""What its model leaves out, for every output that shows its figures."""
+
+_MS_PER_S = 1000.0
+_LEEWAY_MS = 10
+"""Limits are so much wider, so that rounding forbids nothing that is possible."""
+_LARGEST_WEIGHT = 10_000
+_TRAVEL_SHARE = 0.1
+"""What a second of travel costs, as a share of what a second of delay of an average task does."""
+_VISITS_PER_UAV = 4
+"""To bases, on average."""
+_NO_WAY_S = 1e7
+_LONGEST_SHARE = 3.0
+"""Tasks end at the latest after so many times D, if they are not due."""
+
+
+def refusal(problem: FieldProblem) -> str | None:
+    """Why the model has no words for this mission; None if it has."""
+    if not is_installed():
+        return "OR-Tools is not installed: pip install 'peckorder[bench]'"
+    weight = np.where(problem.capable, problem.weight, np.nan)
+    if problem.n_task and (np.nanmax(weight, axis=0) > np.nanmin(weight, axis=0)).any():
+        return "OR-Tools has no words for a p that depends on the UAV"
+    if (problem.survival < 1.0).any():
+        return "OR-Tools has no words for losses"
+    if problem.is_line.any():
+        return "its model here knows no lines"
+    if ((problem.slots > 0) & (problem.slots < problem.n_uav)).any():
+        return "its model here knows no slots at bases"
+    return None
+
+
+def field_lists(
+    problem: FieldProblem, limit_s: float, start: Sequence[Sequence[int]] | None = None
+) -> tuple[tuple[int, ...], ...]:
+    """Lists of items by guided local search; some may break limits by some milliseconds.
+
+    Args:
+        problem: a mission that `refusal` has nothing against.
+        limit_s: of the search, which the building of the model precedes [s]; > 0.
+        start: lists to begin with; its own first solution when None.
+
+    Returns:
+        Items per UAV; all lists empty if it found no solution in time.
+    """
+    if not problem.n_uav or not problem.n_task:
+        return ((),) * problem.n_uav
+    model = _Model(problem)
+    return model.solved(limit_s, None if start is None else model.stated(start))
+
+
+@dataclass(frozen=True, slots=True)
+class _Stops:
+    """Nodes 1, 2, … of the model: every task, then every base several times."""
+
+    task: IntArray
+    """(n_stop,) column; -1: a base."""
+    base: IntArray
+    """(n_stop,) number; -1: a task."""
+    place: IntArray
+    """(n_stop,) node of the problem."""
+    work_s: FloatArray
+    """(n_stop,) service or swap [s]."""
+
+    @classmethod
+    def of(cls, problem: FieldProblem) -> _Stops:
+        """A visit to a base is a node, for it happens once; bases in turn."""
+        tasks = np.flatnonzero(problem.capable.any(axis=0))
+        swaps = bool(problem.n_base) and np.isfinite(problem.full_s).any()
+        visits = np.arange(_VISITS_PER_UAV * problem.n_uav if swaps else 0) % max(1, problem.n_base)
+        return cls(
+            task=np.concatenate([tasks, np.full(len(visits), -1)]).astype(np.int32),
+            base=np.concatenate([np.full(len(tasks), -1), visits]).astype(np.int32),
+            place=np.concatenate([problem.enter[tasks, 0], problem.n_uav + visits]).astype(np.int32),
+            work_s=np.concatenate([problem.service_s[tasks], problem.swap_s[visits]]),
+        )
+
+
+class _Model:
+    """One mission as OR-Tools is told of it; solved once."""
+
+    def __init__(self, problem: FieldProblem) -> None:
+        from ortools.constraint_solver import pywrapcp
+
+        self._problem = problem
+        self._stops = stops = _Stops.of(problem)
+        # Node 0 is every UAV's start, told apart by the matrices, and the end.
+        self._manager = pywrapcp.RoutingIndexManager(len(stops.task) + 1, problem.n_uav, 0)
+        self._routing = pywrapcp.RoutingModel(self._manager)
+        weight = problem.weight.max(axis=0)
+        self._weight_scale = _LARGEST_WEIGHT / max(float(weight.max()), 1e-300)
+        self._weight = np.maximum(1.0, np.rint(weight * self._weight_scale)).astype(np.int64)
+        self._add_times()
+        self._add_tasks()
+        if np.isfinite(problem.full_s).any():
+            self._add_energy()
+
+    def _add_times(self) -> None:
+        """The cumul of a task is its end; arcs cost a share of what they delay."""
+        problem, routing = self._problem, self._routing
+        transits, sum_s = [], np.zeros((len(self._stops.task) + 1,) * 2)
+        for uav in range(problem.n_uav):
+            time_s = _times_s(problem, self._stops, uav)
+            transits.append(routing.RegisterTransitMatrix(_ms(time_s).tolist()))
+            sum_s += time_s
+        price = _TRAVEL_SHARE * float(self._weight.mean()) / problem.n_uav
+        travel = routing.RegisterTransitMatrix(_ms(sum_s * price).tolist())
+        routing.SetArcCostEvaluatorOfAllVehicles(travel)
+        longest = int(_LONGEST_SHARE * problem.horizon_s * _MS_PER_S)
+        routing.AddDimensionWithVehicleTransits(transits, longest, longest, True, "time")
+
+    def _add_tasks(self) -> None:
+        """Windows, what ends cost, and what it costs to leave tasks out; visits are free."""
+        problem, routing = self._problem, self._routing
+        time = routing.GetDimensionOrDie("time")
+        worth = self._weight * problem.until_s * _MS_PER_S
+        dearest = int(worth.sum())
+        for node, task in enumerate(self._stops.task.tolist(), start=1):
+            index = self._manager.NodeToIndex(node)
+            if task < 0:
+                routing.AddDisjunction([index], 0)
+                continue
+            service_s = float(problem.service_s[task])
+            first_s = float(problem.opens_s[task]) + service_s
+            last_s = min(float(problem.closes_s[task]) + service_s, float(problem.due_s[task]))
+            if first_s > 0.0:
+                time.CumulVar(index).SetMin(max(0, int(first_s * _MS_PER_S) - _LEEWAY_MS))
+            if np.isfinite(last_s):
+                time.CumulVar(index).SetMax(int(last_s * _MS_PER_S) + _LEEWAY_MS)
+            time.SetCumulVarSoftUpperBound(index, 0, int(self._weight[task]))
+            for uav in np.flatnonzero(~problem.capable[:, task]).tolist():
+                routing.VehicleVar(index).RemoveValue(uav)
+            required = bool(problem.required[task])
+            routing.AddDisjunction([index], int(worth[task]) + (dearest if required else 0))
+
+    def _add_energy(self) -> None:
+        """Its cumul is the airborne time used since the last swap; slack at a base makes it 0."""
+        problem, routing, manager = self._problem, self._routing, self._manager
+        most = np.where(np.isfinite(problem.full_s), problem.full_s, problem.horizon_s * 10.0)
+        full_ms = _ms(most) + _LEEWAY_MS
+        largest_ms = int(full_ms.max())
+        transits = []
+        for uav in range(problem.n_uav):
+            used_ms = _ms(_used_s(problem, self._stops, uav))
+            used_ms[1:][self._stops.base >= 0] -= largest_ms  # to which slack has raised it there
+            transits.append(routing.RegisterTransitMatrix(used_ms.tolist()))
+        routing.AddDimensionWithVehicleTransitAndCapacity(
+            transits, 2 * largest_ms, full_ms.tolist(), False, "energy"
+        )
+        energy, time = routing.GetDimensionOrDie("energy"), routing.GetDimensionOrDie("time")
+        add = routing.solver().Add
+        for node, base in enumerate(self._stops.base.tolist(), start=1):
+            index = manager.NodeToIndex(node)
+            if base >= 0:
+                add(energy.CumulVar(index) + energy.SlackVar(index) == largest_ms)
+            else:
+                add(energy.SlackVar(index) == time.SlackVar(index))
+        for uav in range(problem.n_uav):
+            index = routing.Start(uav)
+            add(energy.SlackVar(index) == time.SlackVar(index))
+            begun = problem.full_s[uav] - problem.first_s[uav]
+            begun_ms = int(begun * _MS_PER_S) if np.isfinite(begun) else 0
+            energy.CumulVar(index).SetRange(begun_ms, begun_ms)
+
+    def stated(self, lists: Sequence[Sequence[int]]) -> list[list[int]]:
+        """Nodes of lists of items, as far as there are enough visits to bases."""
+        node = {task: n for n, task in enumerate(self._stops.task.tolist(), start=1) if task >= 0}
+        visits: dict[int, list[int]] = {}
+        for n, base in enumerate(self._stops.base.tolist(), start=1):
+            visits.setdefault(base, []).append(n)
+        stated: list[list[int]] = []
+        for items in lists:
+            stated.append([])
+            for item in items:
+                if item < 0 and not visits.get(-1 - item):
+                    break
+                stated[-1].append(node[item >> 1] if item >= 0 else visits[-1 - item].pop(0))
+        return stated
+
+    def solved(
+        self, limit_s: float, start: list[list[int]] | None
+    ) -> tuple[tuple[int, ...], ...]:
+        """Lists of items after so long."""
+        routing = self._routing
+        parameters = _parameters(limit_s)
+        routing.CloseModelWithParameters(parameters)
+        begin = None if start is None else routing.ReadAssignmentFromRoutes(start, True)
+        if begin is None:
+            solution = routing.SolveWithParameters(parameters)
+        else:
+            solution = routing.SolveFromAssignmentWithParameters(begin, parameters)
+        if solution is None:
+            return ((),) * self._problem.n_uav
+        return tuple(self._list(uav, solution) for uav in range(self._problem.n_uav))
+
+    def _list(self, uav: int, solution: Any) -> tuple[int, ...]:
+        routing, items = self._routing, list[int]()
+        index = solution.Value(routing.NextVar(routing.Start(uav)))
+        while not routing.IsEnd(index):
+            stop = self._manager.IndexToNode(index) - 1
+            task, base = int(self._stops.task[stop]), int(self._stops.base[stop])
+            items.append(2 * task if task >= 0 else -1 - base)
+            index = solution.Value(routing.NextVar(index))
+        while items and items[-1] < 0:
+            items.pop()
+        return tuple(items)
+
+
+def _times_s(problem: FieldProblem, stops: _Stops, uav: int) -> FloatArray:
+    """(n_stop + 1, n_stop + 1) from the end of work at a stop to that at the next [s].
+
+    Row 0 is the UAV's start, column 0 the end of its list, which takes no time.
+    """
+    leg_s = problem.leg_s[problem.kind[uav]]
+    time_s = np.zeros((len(stops.place) + 1,) * 2)
+    time_s[0, 1:] = leg_s[uav, stops.place]
+    time_s[1:, 1:] = leg_s[np.ix_(stops.place, stops.place)]
+    time_s[:, 1:] += stops.work_s
+    return time_s
+
+
+def _used_s(problem: FieldProblem, stops: _Stops, uav: int) -> FloatArray:
+    """The same in the air: no swaps, and column 0 is the way home [s]."""
+    used_s = _times_s(problem, stops, uav)
+    used_s[:, 1:] -= np.where(stops.base >= 0, stops.work_s, 0.0)
+    used_s[1:, 0] = problem.home_s[uav, stops.place]
+    used_s[1:, 0][stops.base >= 0] = 0.0
+    return used_s
+
+
+def _ms(time_s: FloatArray) -> npt.NDArray[np.int64]:
+    """Whole milliseconds; where there is no way, more than any limit."""
+    return np.rint(np.minimum(time_s, _NO_WAY_S) * _MS_PER_S).astype(np.int64)
+
+
+def _parameters(limit_s: float) -> Any:
+    """Guided local search with all operators that can add a visit and a task in one move."""
+    from ortools.constraint_solver import pywrapcp, routing_enums_pb2
+    from ortools.util import optional_boolean_pb2
+
+    parameters = pywrapcp.DefaultRoutingSearchParameters()
+    parameters.first_solution_strategy = (
+        routing_enums_pb2.FirstSolutionStrategy.LOCAL_CHEAPEST_COST_INSERTION
+    )
+    parameters.local_search_metaheuristic = (
+        routing_enums_pb2.LocalSearchMetaheuristic.GUIDED_LOCAL_SEARCH
+    )
+    operators = parameters.local_search_operators
+    operators.use_relocate_and_make_active = optional_boolean_pb2.BOOL_TRUE
+    operators.use_exchange_and_make_active = optional_boolean_pb2.BOOL_TRUE
+    operators.use_extended_swap_active = optional_boolean_pb2.BOOL_TRUE
+    parameters.time_limit.FromMilliseconds(max(1, round(limit_s * _MS_PER_S)))
+    return parameters
