@@ -33,7 +33,9 @@ _SLICES = 64
 _FEWEST_IN_SLICE = 20
 _COOL_START = 0.3
 """Heat while it is unknown how long the search will be."""
-_FIRST_POLISH_FRAC, _LAST_POLISH_FRAC = 0.3, 0.05
+_WARM_HEAT = 0.7
+"""From which lists of thousands of tasks are cooled if they were given to begin with."""
+_FIRST_POLISH_FRAC, _LAST_POLISH_FRAC = 0.3, 0.02
 """Of a limit in time, the most that local search may take before the annealing, and what is kept
 for it afterwards."""
 
@@ -175,10 +177,14 @@ def optimise_routes(
     def time_spent_frac() -> float:
         return 0.0 if spent_frac is None else float(spent_frac(0))
 
-    ends = None if spent_frac is None else lambda: not time_spent_frac() < 1.0 - _LAST_POLISH_FRAC
-    search.polish(lambda: not time_spent_frac() < _FIRST_POLISH_FRAC)
-    lanes = search.n_lane()
+    def ends() -> bool:
+        return not time_spent_frac() < 1.0 - _LAST_POLISH_FRAC
+
     full = int(np.sum(team.open)) * search.iterations_for_full_heat()
+    if full > 0.0:
+        search.polish(lambda: not time_spent_frac() < _FIRST_POLISH_FRAC)
+    lanes = search.n_lane()
+    hottest = 1.0 if lists is None or full > 0.0 else _WARM_HEAT
     most = search.most_iterations()
     done = 0
     while True:
@@ -192,8 +198,13 @@ def optimise_routes(
         now = max(_FEWEST_IN_SLICE, min(most, int(total / lanes / _SLICES)))
         if iterations is not None:
             now = min(now, -(-(iterations - done) // lanes))
-        heat = _heat(max(0.0, spent), total, full)
-        search.round(now, heat, threads or os.cpu_count() or 1, ends)
+        heat = hottest * _heat(max(0.0, spent), total, full)
+        search.round(
+            now,
+            heat,
+            threads or os.cpu_count() or 1,
+            None if spent_frac is None else ends,
+        )
         done += now * lanes
         if progress is not None:
             progress(done, search.best_value())
@@ -202,7 +213,10 @@ def optimise_routes(
 
 
 def _heat(spent_frac: float, total: float, full: float) -> float:
-    """Cool along what is spent, from a heat that ``total`` iterations can afford; ``full``, all."""
+    """Cool along what is spent, from a heat that ``total`` iterations can afford; ``full``, all.
+
+    Where ``full`` is 0, any number of them can.
+    """
     if total == 0.0:
         return _COOL_START
     # two square roots, not a power: their floats are the same everywhere

@@ -5,7 +5,7 @@
 namespace peckorder {
 
 namespace {
-constexpr double kMeanTorn = 15.0;
+constexpr double kMeanTorn = 10.0;
 constexpr double kLongestString = 10.0;
 constexpr double kSplitShare = 0.5;
 constexpr double kSplitDepth = 0.01;

@@ -183,7 +183,7 @@ class Solution {
 template <class Skip>
 Insertion best_insertion(const Solution& solution, int task, Skip&& skip) {
   constexpr int kScanAllBelow = 150;
-  constexpr int kNear = 48;
+  constexpr int kManyTasks = 2000, kNear = 48, kNearOfMany = 32;
   const Problem& problem = solution.problem();
   Insertion best;
   const auto offer = [&](int uav, int place) {
@@ -195,7 +195,8 @@ Insertion best_insertion(const Solution& solution, int task, Skip&& skip) {
   if (!all) {
     const double* here_m = problem.place_m(task);
     const std::int32_t* near = problem.near(task);
-    const int most = std::min(kNear, problem.n_near());
+    const int most = 
+        std::min(problem.n_task() < kManyTasks ? kNear : kNearOfMany, problem.n_near());
     const double farthest_m = Problem::straight_m(here_m, problem.place_m(near[most - 1]));
     for (int k = 0; k < most; ++k) {
       const int uav = solution.uav_of(near[k]);

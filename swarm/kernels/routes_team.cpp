@@ -13,19 +13,21 @@ namespace {
 constexpr int kFewestLanes = 2, kMostLanes = 8;
 constexpr int kUavsPerLane = 12;
 constexpr int kUavsToDivide = 10;  // fewer are not divided
-constexpr double kHottest = 1.5;  // of the mean delay; about the cost of a clumsy insertion
+constexpr double kHottest = 12.0;  // of the mean delay; measured on random missions
 constexpr double kHottestGranular = 3.0;  // measured on published instances
 constexpr int kShortList = 80;     // tasks a UAV; up to some 60, Search does as well or better
+constexpr std::size_t kManyTasks = 2000;
 constexpr int kHeatSteps = 64;
 constexpr double kHeatRatio = 0.930572040929699;  // its 64th power is 1/100
+constexpr double kHeatRatioOfFew = 0.8976871324473142;  // and of this one 1/1000
 
-// hottest · (1/100)^(1 - heat), by multiplications alone.
-double temperature(double hottest, double heat) {
+// hottest · ratio^(64 · (1 - heat)), by multiplications alone.
+double temperature(double hottest, double heat, double ratio) {
   const double cold = (1.0 - std::min(1.0, std::max(0.0, heat))) * kHeatSteps;
   const int steps = static_cast<int>(cold);
   double factor = 1.0;
-  for (int k = 0; k < steps; ++k) factor *= kHeatRatio;
-  return hottest * factor * (1.0 - (cold - steps) * (1.0 - kHeatRatio));
+  for (int k = 0; k < steps; ++k) factor *= ratio;
+  return hottest * factor * (1.0 - (cold - steps) * (1.0 - ratio));
 }
 }  // namespace
 
@@ -40,8 +42,10 @@ TeamSearch::TeamSearch(const Problem& problem, const Start& start, std::vector<R
   uavs_ = solution.allowed();
   const double length = static_cast<double>(tasks.size()) / std::max<std::size_t>(1, uavs_.size());
   if (given_ || (problem.certain() && length > kShortList)) terms_.emplace(problem, start, given);
-  most_iterations_ = static_cast<long>(terms_ ? 400.0 / std::max(1.0, length / 100.0)
-                                              : 1000.0 / std::max(1.0, length / 100.0));
+  const bool many = tasks.size() > kManyTasks;
+  heat_ratio_ = terms_ || many ? kHeatRatio : kHeatRatioOfFew;
+  iterations_for_full_heat_ = terms_ ? 200.0 : many ? 0.0 : 1600.0;
+  most_iterations_ = static_cast<long>(400.0 / std::max(1.0, length / 100.0));
   if (given_) {
     GranularSearch first(*terms_, random_.bits());
     first.load(current_, uavs_);
@@ -74,7 +78,7 @@ TeamSearch::TeamSearch(const Problem& problem, const Start& start, std::vector<R
 void TeamSearch::round(long iterations, double heat, int threads, Watch& watch) {
   if (uavs_.empty()) return;
   if (divided_) divide();
-  const double now = temperature(hottest_, heat);
+  const double now = temperature(hottest_, heat, heat_ratio_);
   std::atomic<std::size_t> next{0};
   const auto work = [&] {
     for (std::size_t lane; (lane = next.fetch_add(1)) < lanes_.size();)
@@ -98,33 +102,42 @@ void TeamSearch::polish(Watch& watch) {
   for (auto& lane : lanes_) lane->load(current_, uavs_);
 }
 
-// As many UAVs to each lane, by the middles of their lists along a random direction.
+// As many UAVs to each lane, those near each other by the middles of their lists: halves along a
+// random direction, their halves across it, and so on.
 void TeamSearch::divide() {
-  const double east = random_.uniform() - 0.5, north = random_.uniform() - 0.5;
-  std::vector<std::pair<double, int>> order;
+  std::vector<Middle> middles;
   for (const int uav : uavs_) {
-    double x = 0.0, y = 0.0;
-    for (const int task : current_[uav]) {
-      x += problem_.place_m(task)[0];
-      y += problem_.place_m(task)[1];
+    Middle middle{start_.place_m[3 * std::size_t(uav)], start_.place_m[3 * std::size_t(uav) + 1], uav};
+    const Route& route = current_[uav];
+    if (!route.empty()) {
+      middle.x_m = middle.y_m = 0.0;
+      for (const int task : route) {
+        middle.x_m += problem_.place_m(task)[0] / static_cast<double>(route.size());
+        middle.y_m += problem_.place_m(task)[1] / static_cast<double>(route.size());
+      }
     }
-    const std::size_t count = current_[uav].size();
-    if (count == 0) {
-      x = start_.place_m[3 * std::size_t(uav)];
-      y = start_.place_m[3 * std::size_t(uav) + 1];
-    }
-    const double per = 1.0 / static_cast<double>(std::max<std::size_t>(1, count));
-    order.emplace_back((east * x + north * y) * per, uav);
+    middles.push_back(middle);
   }
-  std::sort(order.begin(), order.end());
-  std::size_t from = 0;
-  for (std::size_t lane = 0; lane < lanes_.size(); ++lane) {
-    const std::size_t to = order.size() * (lane + 1) / lanes_.size();
+  const double east = random_.uniform() - 0.5, north = random_.uniform() - 0.5;
+  divide(middles.data(), middles.data() + middles.size(), 0, n_lane(), east, north);
+}
+
+void TeamSearch::divide(Middle* from, Middle* to, int lane, int lanes, double east, double north) {
+  if (lanes == 1) {
     std::vector<int> part;
-    for (; from < to; ++from) part.push_back(order[from].second);
+    for (const Middle* middle = from; middle != to; ++middle) part.push_back(middle->uav);
     std::sort(part.begin(), part.end());
     lanes_[lane]->load(current_, part);
+    return;
   }
+  std::sort(from, to, [east, north](const Middle& a, const Middle& b) {
+    const double at_a = east * a.x_m + north * a.y_m, at_b = east * b.x_m + north * b.y_m;
+    return at_a < at_b || (at_a == at_b && a.uav < b.uav);
+  });
+  const int half = lanes / 2;
+  Middle* const middle = from + (to - from) * half / lanes;
+  divide(from, middle, lane, half, -north, east);
+  divide(middle, to, lane + half, lanes - half, -north, east);
 }
 
 void TeamSearch::join() {

@@ -31,8 +31,9 @@ class TeamSearch {
   void round(long iterations, double heat, int threads, Watch& watch);
 
   // Iterations per lane that take some 10 ms, and per task that an annealing from full heat takes.
+  // 0: it pays with however few, and gets as far as local search in less time.
   long most_iterations() const { return most_iterations_; }
-  double iterations_for_full_heat() const { return terms_ ? 200.0 : 1600.0; }
+  double iterations_for_full_heat() const { return iterations_for_full_heat_; }
 
   // Local search on the best lists, until no move gains or the watch stops it; the search goes on
   // from there.
@@ -43,7 +44,13 @@ class TeamSearch {
   int n_lane() const { return static_cast<int>(lanes_.size()); }
 
  private:
+  struct Middle {  // of a UAV's list
+    double x_m, y_m;
+    int uav;
+  };
+
   void divide();
+  void divide(Middle* from, Middle* to, int lane, int lanes, double east, double north);
   void join();
 
   const Problem& problem_;
@@ -58,6 +65,8 @@ class TeamSearch {
   double best_value_;
   double hottest_;
   long most_iterations_;
+  double iterations_for_full_heat_;
+  double heat_ratio_;
 };
 
 }  // namespace peckorder
