@@ -33,7 +33,7 @@ _SLICES = 64
 _FEWEST_IN_SLICE = 20
 _COOL_START = 0.3
 """Heat while it is unknown how long the search will be."""
-_WARM_HEAT = 0.7
+_WARM_HEAT = 0.3
 """From which lists of thousands of tasks are cooled if they were given to begin with."""
 _FIRST_POLISH_FRAC, _LAST_POLISH_FRAC = 0.3, 0.02
 """Of a limit in time, the most that local search may take before the annealing, and what is kept

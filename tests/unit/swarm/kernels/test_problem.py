@@ -3,16 +3,19 @@ from __future__ import annotations
 import copy
 import gc
 import pickle
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given as drawn
+from hypothesis import settings
+from hypothesis import strategies as st
 
 from swarm.allocation import Problem, TeamState
 from swarm.kernels._kernels import KernelProblem
 from swarm.kernels.lower_level import GREEDY, decide
-from tests.support.problems import random_problem, table_1
+from swarm.model import TaskId, UavId
+from tests.support.problems import table_1
 
 
 def arguments() -> dict[str, Any]:
@@ -109,23 +112,43 @@ def test_problems_survive_copying_and_pickling() -> None:
         assert decide(twin.kernel, state, 0, GREEDY) == decide(problem.kernel, state, 0, GREEDY)
 
 
-@pytest.mark.parametrize("n_task", [1, 2, 30, 60, 300])
-@pytest.mark.parametrize("spread_m", [(1e3, 1e3, 0.0), (0.0, 1e3, 50.0), (0.0, 0.0, 0.0)])
-def test_near_tasks_are_those_nearest_by_straight_line_and_then_by_index(
-    n_task: int, spread_m: tuple[float, float, float]
+@settings(deadline=None, max_examples=80)
+@drawn(
+    seed=st.integers(0, 2**32 - 1),
+    n_task=st.integers(1, 130),
+    shape=st.sampled_from(["even", "lattice", "line", "one spot", "far apart", "huge"]),
+)
+def test_near_tasks_are_the_nearest_in_order_and_of_equals_the_first(
+    seed: int, n_task: int, shape: str
 ) -> None:
-    rng = np.random.default_rng(n_task)
-    # Whole numbers, so that many are equally far away.
-    places_m = np.round(rng.uniform(0.0, 0.02, (n_task, 3)) * spread_m)
-    problem = replace(random_problem(rng, 2, n_task), task_enu_m=places_m)
+    rng = np.random.default_rng(seed)
+    task_enu_m = rng.uniform(-50.0, 50.0, (n_task, 3))
+    if shape == "lattice":
+        task_enu_m = rng.integers(0, 6, (n_task, 3)).astype(float)
+    elif shape == "line":
+        task_enu_m[:, 0] = 7.0
+    elif shape == "one spot":
+        task_enu_m[:] = task_enu_m[0]
+    elif shape == "far apart":
+        task_enu_m[:: max(1, n_task // 2)] += 1e6
+    elif shape == "huge":
+        task_enu_m *= 1e150
+    ones = np.ones((1, n_task))
+    handle = Problem(
+        uav_ids=(UavId("u"),),
+        task_ids=tuple(TaskId(f"t{k}") for k in range(n_task)),
+        start_enu_m=np.zeros((1, 3)),
+        task_enu_m=task_enu_m,
+        speed_m_s=np.ones(1),
+        value=np.ones(n_task),
+        service_s=np.zeros(n_task),
+        success=ones,
+        survival=ones,
+        horizon_s=1.0,
+    ).kernel
 
-    near = problem.kernel.near
-
-    assert near.shape == (n_task, min(48, n_task - 1))
-    for task in range(n_task):
-        offset_m = places_m - places_m[task]
-        others = np.delete(np.arange(n_task), task)
-        away_m2 = (offset_m**2).sum(axis=1)[others]
-        assert (
-            near[task].tolist() == others[np.lexsort((others, away_m2))][: near.shape[1]].tolist()
-        )
+    d = task_enu_m[None, :, :] - task_enu_m[:, None, :]
+    away_m = np.sqrt((d[..., 0] ** 2 + d[..., 1] ** 2) + d[..., 2] ** 2)
+    np.fill_diagonal(away_m, np.inf)
+    order = np.argsort(away_m, axis=1, kind="stable")[:, : min(48, n_task - 1)]
+    assert np.array_equal(handle.near, order)

@@ -266,3 +266,48 @@ def test_the_search_goes_on_from_where_local_search_ended() -> None:
         )
 
     assert max(best) > polished
+
+
+class Stopwatch:
+    """Lets some questions about time pass, then says that all is spent, from whatever thread."""
+
+    def __init__(self, after: int) -> None:
+        self.after = after
+        self.asked = 0
+
+    def __call__(self, iterations: int) -> float:
+        self.asked += not iterations
+        return 1.0 if self.asked > self.after else 0.0
+
+
+def test_rounds_of_many_lists_leave_off_when_the_time_is_spent() -> None:
+    problem = random_problem(np.random.default_rng(6), 40, 2100, horizon_s=900.0)
+    team = team_of(problem)
+    told: list[int] = []
+    watch = Stopwatch(4)
+
+    lists, worth = optimise_routes(
+        team,
+        spent_frac=watch,
+        progress=lambda done, _: told.append(done),
+        threads=2,
+    )
+
+    assert sorted(task for route in lists for task in route) == list(range(2100))
+    assert abs(team_worth(problem, TeamState.at_start(problem), lists) - worth) <= 1e-9 * worth
+    assert watch.asked <= 4 + 6
+    assert len(told) <= 4
+
+
+@pytest.mark.parametrize("survival", [0.9, 1.0])
+def test_thousands_of_tasks_are_searched_alike_by_any_number_of_threads(survival: float) -> None:
+    rng = np.random.default_rng(8)
+    problem = random_problem(rng, 60, 2100, lowest_survival=survival, horizon_s=400.0)
+    team = team_of(problem)
+
+    runs = [optimise_routes(team, iterations=4000, threads=n) for n in (1, 2, 3)]
+
+    lists, worth = runs[0]
+    assert runs[1] == runs[2] == runs[0]
+    assert sorted(task for route in lists for task in route) == list(range(2100))
+    assert evaluate(problem, lists)[0] == pytest.approx(worth, rel=1e-12)
