@@ -177,9 +177,6 @@ def optimise_routes(
     def time_spent_frac() -> float:
         return 0.0 if spent_frac is None else float(spent_frac(0))
 
-    def ends() -> bool:
-        return not time_spent_frac() < 1.0 - _LAST_POLISH_FRAC
-
     full = int(np.sum(team.open)) * search.iterations_for_full_heat()
     if full > 0.0:
         search.polish(lambda: not time_spent_frac() < _FIRST_POLISH_FRAC)
@@ -199,17 +196,19 @@ def optimise_routes(
         if iterations is not None:
             now = min(now, -(-(iterations - done) // lanes))
         heat = hottest * _heat(max(0.0, spent), total, full)
-        search.round(
-            now,
-            heat,
-            threads or os.cpu_count() or 1,
-            None if spent_frac is None else ends,
-        )
+        search.round(now, heat, threads or os.cpu_count() or 1, _ending(spent_frac))
         done += now * lanes
         if progress is not None:
             progress(done, search.best_value())
     search.polish(lambda: not time_spent_frac() < 1.0)
     return lists_of(*search.best()), search.best_value()
+
+
+def _ending(spent_frac: Callable[[int], float] | None) -> Callable[[], bool] | None:
+    """Whether all that is not kept for the last local search is spent by time."""
+    if spent_frac is None:
+        return None
+    return lambda: not float(spent_frac(0)) < 1.0 - _LAST_POLISH_FRAC
 
 
 def _heat(spent_frac: float, total: float, full: float) -> float:
