@@ -157,14 +157,7 @@ def optimise_routes(
     Raises:
         ValueError: names the argument that is wrong.
     """
-    if (iterations is None) == (spent_frac is None):
-        raise ValueError("iterations or spent_frac must be given, and not both")
-    if iterations is not None and iterations < 0:
-        raise ValueError(f"iterations must be >= 0, not {iterations}")
-    if not 0 <= seed <= _MAX_SEED:
-        raise ValueError(f"seed must be within 0..2**64 - 1, not {seed}")
-    if threads is not None and threads < 1:
-        raise ValueError(f"threads must be >= 1, not {threads}")
+    _check_options(iterations, spent_frac, seed, threads)
     search = _kernels.RouteSearch(
         team.problem,
         *team.arguments(),
@@ -202,6 +195,22 @@ def optimise_routes(
             progress(done, search.best_value())
     search.polish(lambda: not time_spent_frac() < 1.0)
     return lists_of(*search.best()), search.best_value()
+
+
+def _check_options(
+    iterations: int | None,
+    spent_frac: Callable[[int], float] | None,
+    seed: int,
+    threads: int | None,
+) -> None:
+    if (iterations is None) == (spent_frac is None):
+        raise ValueError("iterations or spent_frac must be given, and not both")
+    if iterations is not None and iterations < 0:
+        raise ValueError(f"iterations must be >= 0, not {iterations}")
+    if not 0 <= seed <= _MAX_SEED:
+        raise ValueError(f"seed must be within 0..2**64 - 1, not {seed}")
+    if threads is not None and threads < 1:
+        raise ValueError(f"threads must be >= 1, not {threads}")
 
 
 def _ending(spent_frac: Callable[[int], float] | None) -> Callable[[], bool] | None:
