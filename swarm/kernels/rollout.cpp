@@ -23,10 +23,19 @@ namespace peckorder {
 namespace {
 
 constexpr int kCandidates = 10;
-constexpr int kMostSearched = 12;      // UAVs whose lists a decision reconsiders
 constexpr double kTie = 1e-9;          // of the worth; less is no reason to leave the lists
 constexpr double kHeat = 0.02;         // of the mean delay
 constexpr std::uint64_t kSeed = 2005;  // every replica searches alike
+
+// What bounds the work of a decision. Up to kFewTasks the place of a missing task is looked for
+// everywhere, beyond that beside so many of the near tasks that are on lists.
+constexpr int kFewTasks = 150;
+constexpr int kNearToPlace = 10;
+// UAVs whose lists are reconsidered, and tasks on these: the list that goes beyond is the last.
+constexpr std::size_t kMostSearched = 12;
+constexpr std::size_t kMostTasks = 100;
+// Of a watch, for local search before the search and again after it.
+constexpr std::int64_t kMostSteps = 60'000;
 
 // Open tasks by m·p / (travel + service), best first.
 std::vector<int> candidates(const Solution& solution, const std::vector<int>& open, int uav) {
@@ -60,7 +69,45 @@ double worth_with_first(Solution& solution, int uav, int task, double total) {
   return worth;
 }
 
-// The deciding UAV and those whose next places are nearest to it.
+// Where J gains most by it, beside one of the near tasks or at the front of a UAV that is as near.
+Insertion near_insertion(const Solution& solution, int task) {
+  const Problem& problem = solution.problem();
+  if (problem.n_task() <= kFewTasks) return best_insertion(solution, task);
+  const double* here_m = problem.place_m(task);
+  Insertion best;
+  const auto offer = [&](int uav, int place) {
+    const double gain = solution.insertion_gain(uav, place, task);
+    if (gain > best.gain) best = {uav, place, gain};
+  };
+  int farthest = -1;
+  int found = 0;
+  for (int k = 0; k < problem.n_near() && found < kNearToPlace; ++k) {
+    const int near = problem.near(task)[k];
+    const int uav = solution.uav_of(near);
+    if (uav < 0 || !problem.capable(uav, task)) continue;
+    offer(uav, solution.place_of(near));
+    offer(uav, solution.place_of(near) + 1);
+    farthest = near;
+    ++found;
+  }
+  if (found < kNearToPlace) return best_insertion(solution, task);
+  const double farthest_m = Problem::straight_m(here_m, problem.place_m(farthest));
+  for (const int uav : solution.allowed()) {
+    const double* start_m = &solution.start().place_m[3 * static_cast<std::size_t>(uav)];
+    if (problem.capable(uav, task) && Problem::straight_m(here_m, start_m) <= farthest_m)
+      offer(uav, 0);
+  }
+  return best;
+}
+
+void place_missing(Solution& solution, const std::vector<int>& open) {
+  for (const int task : missing(solution, open)) {
+    const Insertion best = near_insertion(solution, task);
+    if (best.uav >= 0) solution.insert(best.uav, best.place, task);
+  }
+}
+
+// The deciding UAV and those whose next places are nearest to it, ascending.
 std::vector<int> near_uavs(const Solution& solution, int uav) {
   const Start& start = solution.start();
   const double* here = &start.place_m[3 * static_cast<std::size_t>(uav)];
@@ -74,15 +121,24 @@ std::vector<int> near_uavs(const Solution& solution, int uav) {
   }
   std::sort(order.begin(), order.end());
   std::vector<int> uavs;
-  for (std::size_t k = 0; k < std::min<std::size_t>(kMostSearched, order.size()); ++k)
-    uavs.push_back(order[k].second);
+  std::size_t tasks = 0;
+  for (const auto& [nearest_m, other] : order) {
+    if (uavs.size() == kMostSearched || tasks >= kMostTasks) break;
+    uavs.push_back(other);
+    tasks += solution.route(other).size();
+  }
   std::sort(uavs.begin(), uavs.end());
   return uavs;
 }
 
+void improve_briefly(Solution& solution, const std::vector<int>& uavs) {
+  Watch budget(kMostSteps);
+  improve(solution, uavs, budget);
+}
+
 void reconsider(Solution& solution, int uav, long iterations) {
   const std::vector<int> uavs = near_uavs(solution, uav);
-  improve(solution, uavs);
+  improve_briefly(solution, uavs);
   Search search(solution.problem(), solution.start(), kSeed);
   search.load(solution.routes(), uavs);
   const double hottest = kHeat * solution.mean_delay();
@@ -91,7 +147,7 @@ void reconsider(Solution& solution, int uav, long iterations) {
   for (int step = 0; step < kSteps; ++step)
     search.run(iterations / kSteps, hottest * (kSteps - step) / kSteps, never);
   for (const int other : uavs) solution.set_route(other, search.best_route(other));
-  improve(solution, uavs);
+  improve_briefly(solution, uavs);
 }
 
 }  // namespace
@@ -101,7 +157,7 @@ GuidedChoice guided_choice(const Problem& problem, const Start& start,
                            long iterations) {
   Solution solution(problem, start);
   for (const int other : solution.allowed()) solution.set_route(other, lists[other]);
-  insert_missing(solution, open);
+  place_missing(solution, open);
   if (iterations > 0) reconsider(solution, uav, iterations);
   GuidedChoice choice;
   const double total = solution.total();
@@ -140,8 +196,8 @@ void bind_rollout(nb::module_& module) {
         GuidedChoice choice;
         {
           const nb::gil_scoped_release released;
-          choice = guided_choice(problem, arrays.start(problem), lists, open_tasks(open), uav,
-                                 iterations);
+          choice = guided_choice(problem, arrays.start(problem, false), lists, open_tasks(open),
+                                 uav, iterations);
         }
         return std::make_tuple(choice.task, choice.worth, choice.second, choice.planned,
                                choice.valued);

@@ -29,8 +29,8 @@ struct StartArrays {
   const Vector& survived;
   const Mask& active;
 
-  Start start(const Problem& problem) const {
-    return Start(problem, free_s.data(), place_m.data(), survived.data(), active.data());
+  Start start(const Problem& problem, bool tabulates = true) const {
+    return Start(problem, free_s.data(), place_m.data(), survived.data(), active.data(), tabulates);
   }
 };
 

@@ -13,7 +13,7 @@ constexpr int kSteps = 1000;  // of a watch, for an iteration
 constexpr double kMeanToBlink = 99.5;  // places between two that are overlooked; 1 %
 }  // namespace
 
-void insert_missing(Solution& solution, const std::vector<int>& tasks) {
+std::vector<int> missing(const Solution& solution, const std::vector<int>& tasks) {
   const Problem& problem = solution.problem();
   std::vector<std::pair<double, int>> order;
   for (const int task : tasks) {
@@ -24,7 +24,13 @@ void insert_missing(Solution& solution, const std::vector<int>& tasks) {
     if (most >= 0.0) order.emplace_back(-most, task);
   }
   std::sort(order.begin(), order.end());
-  for (const auto& [key, task] : order) {
+  std::vector<int> found;
+  for (const auto& [key, task] : order) found.push_back(task);
+  return found;
+}
+
+void insert_missing(Solution& solution, const std::vector<int>& tasks) {
+  for (const int task : missing(solution, tasks)) {
     const Insertion best = best_insertion(solution, task);
     if (best.uav >= 0) solution.insert(best.uav, best.place, task);
   }

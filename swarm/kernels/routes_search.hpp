@@ -15,7 +15,10 @@
 
 namespace peckorder {
 
-// Put every capable open task that is on no list where J gains most, most valuable first.
+// Those of the tasks that are on no list and that an allowed UAV can do, most valuable first.
+std::vector<int> missing(const Solution& solution, const std::vector<int>& tasks);
+
+// Put these where J gains most, in that order.
 void insert_missing(Solution& solution, const std::vector<int>& tasks);
 
 class Search : public Lane {

@@ -6,17 +6,18 @@
 namespace peckorder {
 
 Start::Start(const Problem& problem, const double* free, const double* place,
-             const double* survival, const bool* takes_part)
+             const double* survival, const bool* takes_part, bool tabulates)
     : free_s(free, free + problem.n_uav()),
       survived(survival, survival + problem.n_uav()),
       place_m(place, place + 3 * static_cast<std::size_t>(problem.n_uav())),
-      active(takes_part, takes_part + problem.n_uav()) {
+      active(takes_part, takes_part + problem.n_uav()),
+      problem_(&problem) {
   problem.lay_out();
+  if (!tabulates) return;
   travel_s_.resize(static_cast<std::size_t>(problem.n_uav()) * problem.n_task());
   for (int task = 0; task < problem.n_task(); ++task)
     for (int uav = 0; uav < problem.n_uav(); ++uav)
-      travel_s_[at(uav, task)] =
-          problem.quick_travel_s(uav, &place_m[3 * std::size_t(uav)], task);
+      travel_s_[at(uav, task)] = worked_out_s(uav, task);
 }
 
 Solution::Solution(const Problem& problem, const Start& start)

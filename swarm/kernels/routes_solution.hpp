@@ -21,18 +21,25 @@ class Start {
   std::vector<double> free_s, survived, place_m;  // (n_uav,), (n_uav,), (n_uav, 3)
   std::vector<std::uint8_t> active;
 
+  // Who asks for few of the times to tasks needs no table of them all.
   Start(const Problem& problem, const double* free_s, const double* place_m,
-        const double* survived, const bool* active);
+        const double* survived, const bool* active, bool tabulates = true);
 
   // From where it begins to any task.
-  double travel_s(int uav, int task) const { return travel_s_[at(uav, task)]; }
+  double travel_s(int uav, int task) const {
+    return travel_s_.empty() ? worked_out_s(uav, task) : travel_s_[at(uav, task)];
+  }
 
  private:
   std::size_t at(int uav, int task) const {
     return static_cast<std::size_t>(task) * free_s.size() + uav;
   }
+  double worked_out_s(int uav, int task) const {
+    return problem_->quick_travel_s(uav, &place_m[3 * static_cast<std::size_t>(uav)], task);
+  }
 
-  std::vector<double> travel_s_;  // (n_task, n_uav)
+  const Problem* problem_;
+  std::vector<double> travel_s_;  // (n_task, n_uav), or empty
 };
 
 struct Insertion {

@@ -262,6 +262,43 @@ def team_worth(problem: Problem, state: TeamState, lists: Sequence[Sequence[int]
     return sum(list_worth(problem, state, uav, route) for uav, route in enumerate(lists))
 
 
+def repaired(problem: Problem, state: TeamState, lists: Sequence[Sequence[int]]) -> RouteLists:
+    """``lists`` with each open task that is on none put where J gains most, most valuable first.
+
+    Of up to 150 tasks all places count. Beyond, those beside the ten nearest tasks on lists, and
+    the fronts of UAVs that are no farther away than the last of these; all UAVs can do all tasks.
+    """
+    now = [list(route) for route in lists]
+    listed = {task for route in now for task in route}
+    missing = [int(task) for task in np.flatnonzero(state.open) if int(task) not in listed]
+    uavs = [int(uav) for uav in np.flatnonzero(state.active)]
+    most = {task: max(float(problem.weight[uav, task]) for uav in uavs) for task in missing}
+    for task in sorted(missing, key=lambda task: (-most[task], task)):
+        here = problem.task_enu_m[task]
+        near = sorted(
+            (float(np.linalg.norm(problem.task_enu_m[other] - here)), uav, place)
+            for uav in uavs
+            for place, other in enumerate(now[uav])
+        )[:10]
+        places = {(uav, before) for _, uav, place in near for before in (place, place + 1)}
+        for uav in uavs:
+            if problem.n_task <= 150:
+                places |= {(uav, before) for before in range(len(now[uav]) + 1)}
+            elif float(np.linalg.norm(state.place_enu_m[uav] - here)) <= near[-1][0]:
+                places.add((uav, 0))
+
+        def gain(at: tuple[int, int], task: int = task) -> float:
+            uav, before = at
+            longer = [*now[uav][:before], task, *now[uav][before:]]
+            return list_worth(problem, state, uav, longer) - list_worth(
+                problem, state, uav, now[uav]
+            )
+
+        uav, before = max(places, key=gain)
+        now[uav].insert(before, task)
+    return now
+
+
 def timed_list_worth(
     problem: Problem, timetable: Timetable, uav: int, route: Sequence[int]
 ) -> float | None:

@@ -13,7 +13,7 @@ from swarm.allocation.rules import GuidedRule, team_arrays, team_at_start
 from swarm.kernels.rollout import guided_choice
 from swarm.kernels.routes import optimise_routes
 from tests.support.problems import any_problem, random_problem
-from tests.support.reference import team_worth
+from tests.support.reference import repaired, team_worth
 
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -116,14 +116,41 @@ def test_after_a_loss_and_pop_ups_every_task_is_still_done(
     assert set(np.flatnonzero(able & everybody).tolist()) <= set(done)
 
 
-def test_every_replica_decides_alike() -> None:
-    problem = random_problem(np.random.default_rng(4), 6, 30, horizon_s=30.0)
+@settings(deadline=None, max_examples=25)
+@given(seed=SEEDS, n_task=st.sampled_from((12, 40, 151, 180)), lowest=st.sampled_from((0.8, 1.0)))
+def test_lists_are_repaired_as_defined_and_searching_makes_them_no_worse(
+    seed: int, n_task: int, lowest: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    problem = random_problem(rng, 9, n_task, lowest_survival=lowest, horizon_s=60.0)
+    lists = any_lists(problem, rng, left_out=0.15)
+    state = TeamState.at_start(problem)
+    state.active[8] = False
+    lists[8] = []
+    uav = int(rng.integers(8))
+    team = team_arrays(problem, state, state.active, 0.0)
+    defined = repaired(problem, state, lists)
+    worth = team_worth(problem, state, defined)
+
+    choice = guided_choice(team, lists, uav)
+    searched = guided_choice(team, lists, uav, iterations=30)
+
+    assert choice.planned == (defined[uav][0] if defined[uav] else None)
+    if choice.planned is not None:
+        assert dict(choice.valued)[choice.planned] == pytest.approx(worth, rel=1e-9)
+    assert searched.worth >= worth - 1e-9 * (1.0 + abs(worth))
+
+
+@pytest.mark.parametrize(("n_uav", "n_task"), [(6, 30), (12, 200)])
+def test_every_replica_decides_alike(n_uav: int, n_task: int) -> None:
+    problem = random_problem(np.random.default_rng(4), n_uav, n_task, horizon_s=30.0)
     lists = any_lists(problem, np.random.default_rng(4), left_out=0.3)
     state = TeamState.at_start(problem)
+    rank = np.arange(n_uav)
     used, fresh = rule_of(problem, lists), rule_of(problem, lists)
-    used.decide(problem, state, np.arange(6), 3)
+    used.decide(problem, state, rank, 3)
 
-    a, b = (rule.decide(problem, state, np.arange(6), 0) for rule in (used, fresh))
+    a, b = (rule.decide(problem, state, rank, 0) for rule in (used, fresh))
 
     assert isinstance(a, Decision)
     assert a == b
