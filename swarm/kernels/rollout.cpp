@@ -33,9 +33,9 @@ constexpr int kFewTasks = 150;
 constexpr int kNearToPlace = 10;
 // UAVs whose lists are reconsidered, and tasks on these: the list that goes beyond is the last.
 constexpr std::size_t kMostSearched = 12;
-constexpr std::size_t kMostTasks = 100;
+constexpr std::size_t kMostTasks = 80;
 // Of a watch, for local search before the search and again after it.
-constexpr std::int64_t kMostSteps = 60'000;
+constexpr std::int64_t kMostSteps = 40'000;
 
 // Open tasks by m·p / (travel + service), best first.
 std::vector<int> candidates(const Solution& solution, const std::vector<int>& open, int uav) {
@@ -76,7 +76,7 @@ Insertion near_insertion(const Solution& solution, int task) {
   const double* here_m = problem.place_m(task);
   Insertion best;
   const auto offer = [&](int uav, int place) {
-    const double gain = solution.insertion_gain(uav, place, task);
+    const double gain = solution.insertion_gain(uav, place, task, best.gain);
     if (gain > best.gain) best = {uav, place, gain};
   };
   int farthest = -1;

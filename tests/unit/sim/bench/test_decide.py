@@ -23,6 +23,22 @@ def test_decisions_of_every_rule_are_timed() -> None:
     assert bench.sequences_per_s_threaded > 0.0
 
 
+class _SlowClock(SystemClock):
+    """Every look at it takes a second, and so every decision."""
+
+    def __init__(self) -> None:
+        self._looks = 0
+
+    def now_s(self) -> float:
+        self._looks += 1
+        return float(self._looks)
+
+
+def test_of_a_large_mission_the_beginning_is_decided() -> None:
+    bench = measure_decisions(4, 40, 0, _SlowClock(), sequences=2)
+    assert [row.decisions for row in bench.times] == [21, 21, 21, 21]
+
+
 def test_it_is_told_to_people_and_programs() -> None:
     bench = measure_decisions(3, 9, 1, SystemClock(), sequences=5)
     stream = io.StringIO()
