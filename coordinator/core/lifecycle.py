@@ -15,7 +15,7 @@ from enum import Enum
 from coordinator.planner.online import EpochPolicy, ReplanResult, Situation
 from swarm.model import Mission, Plan, Uav, UavId
 from swarm.model.layers import FlightLayers
-from swarm.protocol.board import TaskBoard, TaskState, doable, is_of_field, mission_of
+from swarm.protocol.board import TaskBoard, TaskState, anything_doable, is_of_field, mission_of
 from swarm.protocol.calibration import FlightRates, flight_rates, noticeably_otherwise
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
 from swarm.protocol.field_messages import ZoneSpec
@@ -389,7 +389,7 @@ class MissionEndCondition:
         """Whether an open task is left that one of those could still do."""
         field = self._board.field_problem
         if field is None:
-            return bool(doable(self._board, present))
+            return anything_doable(self._board, present)
         from swarm.protocol.field_board import doable_in_field  # plain missions never load it
 
         return bool(present) and bool(doable_in_field(field, self._board, present, mission_s))

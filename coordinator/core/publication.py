@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from dataclasses import replace
+from itertools import takewhile
 
 from coordinator.mission_view.missed import able_alone
 from swarm.model import Mission, Origin, Task, Uav
@@ -198,6 +199,8 @@ class RegisterAnnouncer:
         self._announce_s = timing.announce_s
         self._announce_at_s: float | None = None
         self._announced = 0
+        self._to_come: list[tuple[int, Task]] = []
+        self._to_come_version: int | None = None
 
     @property
     def incarnation(self) -> int:
@@ -227,12 +230,7 @@ class RegisterAnnouncer:
     def post(self, now_s: float) -> list[Publish | LogLine]:
         """Put on the board what is due by now; before the start, what has been there all along."""
         actions: list[Publish | LogLine] = []
-        unreleased = {task.id for task in unreleased_tasks(self._replica, self._mission)}
-        for number, task in enumerate(self._mission.tasks):
-            # The same sum as the deadline's: another may round to just before it.
-            due = self.zero_s is not None and self.zero_s + task.appears_s <= now_s
-            if task.id not in unreleased or not (due or task.appears_s == 0.0):
-                continue
+        for number, task in sorted(self._due(now_s), key=lambda item: item[0]):
             actions.append(self.say(task_entry_of(task, number)))
             if self.zero_s is not None:
                 actions.append(LogLine("pop-up posted", {"task": task.id}))
@@ -241,7 +239,29 @@ class RegisterAnnouncer:
     @property
     def more_to_come(self) -> bool:
         """Whether tasks have yet to appear."""
-        return bool(unreleased_tasks(self._replica, self._mission))
+        return bool(self._unreleased)
+
+    @property
+    def _unreleased(self) -> list[tuple[int, Task]]:
+        """Tasks that have not appeared yet with their numbers, the next one to appear first."""
+        if self._to_come_version != self._replica.board_version:
+            board, tasks = self._replica.board, self._mission.tasks
+            found = [(number, task) for number, task in enumerate(tasks) if task.id not in board]
+            self._to_come = sorted(found, key=lambda item: item[1].appears_s)
+            self._to_come_version = self._replica.board_version
+        return self._to_come
+
+    def _due(self, now_s: float) -> list[tuple[int, Task]]:
+        """Those of them whose time has come."""
+
+        def is_due(item: tuple[int, Task]) -> bool:
+            appears_s = item[1].appears_s
+            # The same sum as the deadline's: another may round to just before it.
+            return appears_s == 0.0 or (
+                self.zero_s is not None and self.zero_s + appears_s <= now_s
+            )
+
+        return list(takewhile(is_due, self._unreleased))
 
     def merged(self, theirs: Iterable[Message]) -> list[TaskEntry]:
         """What another coordinator of the mission has posted or withdrawn, and this one has not."""
@@ -334,8 +354,7 @@ class RegisterAnnouncer:
         """When the next task appears in a mission that has begun."""
         if self.zero_s is None:
             return None
-        tasks = unreleased_tasks(self._replica, self._mission)
-        return min((self.zero_s + task.appears_s for task in tasks), default=None)
+        return self.zero_s + self._unreleased[0][1].appears_s if self._unreleased else None
 
 
 def _register(body: Body) -> tuple[type[Body], str | None]:

@@ -12,11 +12,9 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from enum import StrEnum
 from itertools import islice
 
-import numpy as np
-
 from swarm.allocation import field
 from swarm.allocation.lower_level import Rule, TeamState
-from swarm.allocation.problem import BoolArray, Problem
+from swarm.allocation.problem import Problem
 from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.model.mission import PLAIN_CONSTRAINTS
@@ -70,27 +68,24 @@ class TaskState(StrEnum):
     WITHDRAWN = "withdrawn"
 
 
-def doable(board: TaskBoard, present: Collection[str]) -> list[str]:
-    """Open tasks that some UAV taking part in the mission is capable of, in board order.
+def anything_doable(board: TaskBoard, present: Collection[str]) -> bool:
+    """Whether some UAV taking part in the mission is capable of some open task.
 
     ``present`` are the writers believed alive; the lost take no part.
     """
-    problem = board.problem
-    if problem is None:
-        return []
-    claims = board.replica.claims
+    problem, claims = board.problem, board.replica.claims
+    if problem is None or not present:
+        return False
     able = [
         index
         for index, uav in enumerate(problem.uav_ids)
         if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
     ]
-    can: BoolArray = np.any(problem.capable[able, :], axis=0)
-    states = board.states  # in board order, as the problem's tasks are
-    return [
-        task
-        for (task, state), somebody_can in zip(states.items(), can, strict=True)
-        if state is TaskState.OPEN and somebody_can
-    ]
+    # In board order, as the problem's tasks are; mostly one of the first that are open will do.
+    return any(
+        state is TaskState.OPEN and bool(problem.capable[able, column].any())
+        for column, state in enumerate(board.states.values())
+    )
 
 
 class TaskBoard:
