@@ -61,6 +61,27 @@ def test_a_new_plan_is_no_worse_than_going_on_and_plans_what_is_open(seed: int) 
         assert found == replan(situation, COURSE, "guided", seed=seed, threads=2)
 
 
+@pytest.mark.parametrize("most", [0, 1, 3, 10])
+def test_stopped_at_any_moment_a_plan_is_no_worse_than_going_on(most: int) -> None:
+    for moment in moments(2):
+        situation, asked = situation_of(moment), 0
+
+        def stop(evaluations: float) -> bool:
+            nonlocal asked
+            asked += 1
+            return asked > most
+
+        if situation.is_settled:
+            continue
+        found = replan(situation, COURSE, "guided", stop=stop, threads=1)
+
+        new, old = found.prediction, found.going_on
+        assert (-new.n_left_out, new.objective) >= (-old.n_left_out, old.objective)
+        listed = [task for tasks in new.lists.values() for task in tasks]
+        assert len(set(listed)) == len(listed)
+        assert asked > most
+
+
 @pytest.mark.parametrize("rule", ["greedy", "lookahead"])
 def test_rules_are_predicted_by_letting_them_decide(rule: str) -> None:
     for moment in moments(3)[:4]:
