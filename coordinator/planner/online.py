@@ -280,6 +280,9 @@ def replan(
     expected = predicted(situation, course, part_of(stop, _GOING_ON_FRAC))
     search_stop = part_of(stop, _SEARCH_FRAC)
     if method == GuidedRule.name:
+        if search_stop(0.0):  # to lay a search out takes longer than to say so
+            sequence = _of_active(situation, _rows(situation, course.sequence))
+            return ReplanResult(method, sequence, expected, expected)
         return _guided_anew(situation, expected, seed=seed, stop=search_stop, threads=threads)
     problem, state = situation.problem, situation.state
     order = search_sequence(

@@ -423,6 +423,9 @@ class AskedClock:
         self.time_s += 0.001
         return self.time_s
 
+    def wall_delay_s(self, duration_s: float) -> float:
+        return duration_s
+
 
 @pytest.mark.parametrize("limit_s", [0.01, 0.1, 0.5])
 def test_one_limit_holds_for_searching_and_predicting_together(limit_s: float) -> None:
