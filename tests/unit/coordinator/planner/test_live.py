@@ -423,8 +423,8 @@ class AskedClock:
         self.time_s += 0.001
         return self.time_s
 
-    def wall_delay_s(self, duration_s: float) -> float:
-        return duration_s
+    def wall_delay_s(self, delay_s: float) -> float:
+        return delay_s
 
 
 @pytest.mark.parametrize("limit_s", [0.01, 0.1, 0.5])
