@@ -86,8 +86,8 @@ def plan(
         bool,
         typer.Option(
             "--bound/--no-bound",
-            help="Where the optimum is not proven at once, spend some seconds on an upper bound on J, "
-            "which may prove it.",
+            help="Where the optimum is not proven at once, spend some seconds on an upper bound "
+            "on J, which may prove it.",
         ),
     ] = True,
     bound_s: Annotated[
@@ -105,8 +105,9 @@ def plan(
 
     Of a scenario of schema 2 also the schedule: swaps, waits, ways home, and what is left out.
     Tasks that appear later are unknown to a plan. The same seed gives the same plan,
-    unless --time-limit-s cuts the search short. That limit holds for all but drawing and exporting:
-    reading, searching and the bound, but what --bound-s asks for. Ctrl-C ends the search with the best so far.
+    unless --time-limit-s cuts the search short. That limit holds for all but drawing, exporting
+    and what --bound-s adds: reading, searching and the bound. Ctrl-C ends the search with the
+    best so far.
 
     Examples:
         swarm plan table-1

@@ -14,7 +14,7 @@ which no task need be on any. Relax "each task at most once" with prices π >= 0
 `swarm.kernels.routes_pricing.price_lists` bounds each maximum from above, exact in time. The prices
 begin as what each task adds to known lists; which ones to try next a proximal bundle method says
 from all lists found so far (`lagrangian_bound`). Any prices yield a bound, and the least one seen
-is kept. Where that is close enough to the best lists known, those that could still be part of better
+is kept. Where that is close enough to the best lists known, all lists that could be part of better
 ones are named and the best of them chosen (`coordinator.planner.closing`): then the bound is the
 optimum.
 """
@@ -22,13 +22,13 @@ optimum.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from coordinator.planner.closing import best_disjoint
-from coordinator.planner.options import ShouldStop, never
+from coordinator.planner.options import ShouldStop, never, part_of
 from swarm.allocation.problem import FloatArray, Problem
 from swarm.allocation.rules import team_at_start
 from swarm.kernels.routes import TeamArrays
@@ -37,15 +37,24 @@ from swarm.kernels.routes_pricing import ListBundle, PricedLists, price_lists, w
 Pricing = Callable[[FloatArray], PricedLists | None]
 """The best lists at given prices, bounded from above; None where it was told to stop."""
 _MOST_ROUNDS = 200
-_FIRST_STEP, _LONGEST_STEP = 0.1, 1000.0
-"""By how much the price of a task on two lists rises first, as a share of the bound per task; and
-how many times as long a step may get before no prices are taken to be better."""
+_FIRST_STEP, _LONGEST_STEP = 0.1, 100.0
+"""As shares of the bound per task: by how much the price of a task on two lists rises first, and
+how long a step must be before no prices are taken to be better."""
 _LONGER, _SHORTER = 2.0, 0.7
 _ACCEPTED, _GOOD = 0.1, 0.5
 """Shares of the expected gain from which on prices become the centre, and steps longer."""
-_SWEEPS = 300
+_SWEEPS, _ROUGH_SWEEPS = 300, 50
 _SETTLED = 1e-7
 """Of the bound: no prices lower it by more."""
+_GROUPS = 10
+_PASSES = 8
+_ROUGH_NEAR, _ROUGH_HEADS = 16, 300
+_FIRST_ROUGH_STEP, _LAST_ROUGH_STEP = 0.03, 0.012
+"""As shares of the bound per task."""
+_ROUGH_FRAC = 0.4
+"""The most of a limit that goes by before the first bound is worked out."""
+_HEADS_TIMES_TASKS, _FEWEST_HEADS = 2_000_000, 200
+"""Beginnings of a list that are continued at most: some 20 ms."""
 _ROUNDING = 2e-10
 _MET = 1e-9
 _CLOSING_HEADS = 100_000
@@ -139,11 +148,15 @@ def upper_bound(
                 progress(bound)
 
     known = _Known.of(problem, lists)
+    price, bundle = known.price, known.bundle(problem.n_uav)
+    price = _approached(team, price, bundle, part_of(should_stop, _ROUGH_FRAC), threads)
+    heads = max(_FEWEST_HEADS, _HEADS_TIMES_TASKS // problem.n_task)
     relaxed = lagrangian_bound(
-        partial(price_lists, team, threads=threads, should_stop=stops),
-        known.price,
-        known.bundle(problem.n_uav),
+        partial(price_lists, team, heads=heads, threads=threads, should_stop=stops),
+        price,
+        bundle,
         enough=known.worth,
+        first_step=_LAST_ROUGH_STEP,
         should_stop=should_stop,
         progress=note,
     )
@@ -161,6 +174,7 @@ def lagrangian_bound(
     *,
     enough: float = 0.0,
     rounds: int = _MOST_ROUNDS,
+    first_step: float = _FIRST_STEP,
     should_stop: ShouldStop = never,
     progress: Callable[[float], None] | None = None,
 ) -> Relaxed:
@@ -168,10 +182,12 @@ def lagrangian_bound(
 
     Args:
         pricing: bounds the best list of each UAV from above at given prices.
-        price: (n_task,) to begin with [value·s]; >= 0; the centre of ``bundle``.
+        price: (n_task,) to begin with [value·s]; >= 0.
         bundle: knows lists already, and learns those that are found.
         enough: no lower bound is looked for [value·s].
         rounds: prices that are tried, at most.
+        first_step: by how much the price of a task on two lists rises first, as a share of the
+            bound per task.
         should_stop: asked after each round with the rounds made.
         progress: told the bound of each round [value·s].
     """
@@ -191,16 +207,15 @@ def lagrangian_bound(
         if progress is not None:
             progress(bound)
         made += 1
-        some = [uav for uav, one in enumerate(found.lists) if one]
-        bundle.add(some, found.worth[some], [found.lists[uav] for uav in some])
+        _learn(bundle, found)
         if made == 1:
-            step = _FIRST_STEP * max(bound, _ROUNDING) / max(1, len(price))
-            longest = _LONGEST_STEP * step
+            step = first_step * max(bound, _ROUNDING) / max(1, len(price))
+            longest = _LONGEST_STEP * max(bound, _ROUNDING) / max(1, len(price))
         gain = centre - expected
         if made == 1 or centre - bound >= _ACCEPTED * gain:
             if made > 1 and centre - bound >= _GOOD * gain:
                 step *= _LONGER
-            bundle.accept()
+            bundle.move_centre(price)
             centre = bound
         elif bound >= centre:
             step *= _SHORTER
@@ -219,6 +234,54 @@ def lagrangian_bound(
     return Relaxed(best.bound, best.price, best.earned, made, settled)
 
 
+def _approached(
+    team: TeamArrays,
+    price: FloatArray,
+    bundle: ListBundle,
+    should_stop: ShouldStop,
+    threads: int | None,
+) -> FloatArray:
+    """Prices near the best ones, found quickly; no bound comes of them yet.
+
+    Lists of short legs are priced, a group of UAVs at a time, and prices follow after each group
+    (incremental subgradients do the same: Nedić and Bertsekas 2001, doi:10.1137/S1052623499362111).
+    """
+    n_uav = team.problem.n_uav
+    per_task = max(float(bundle.value), _ROUNDING) / max(1, len(price))
+    tolerance = _SETTLED * per_task * len(price) / n_uav
+    count = min(_GROUPS, n_uav)
+    groups = [
+        replace(team, active=np.asarray(team.active) & (np.arange(n_uav) % count == group))
+        for group in range(count)
+    ]
+    shrinks = (_LAST_ROUGH_STEP / _FIRST_ROUGH_STEP) ** (1.0 / (_PASSES - 1))
+    for made in range(_PASSES):
+        step = _FIRST_ROUGH_STEP * shrinks**made * per_task
+        for group in groups:
+            found = price_lists(
+                group,
+                price,
+                heads=_ROUGH_HEADS,
+                near=_ROUGH_NEAR,
+                threads=threads,
+                should_stop=lambda: should_stop(0.0),
+            )
+            if found is None:
+                return price
+            _learn(bundle, found)
+            price = bundle.solve(
+                step, tolerance, sweeps=_ROUGH_SWEEPS, should_stop=lambda: should_stop(0.0)
+            )
+            bundle.move_centre(price)
+    return price
+
+
+def _learn(bundle: ListBundle, found: PricedLists) -> None:
+    """Make the lists known."""
+    some = [uav for uav, one in enumerate(found.lists) if one]
+    bundle.add(some, found.worth[some], [found.lists[uav] for uav in some])
+
+
 def _closed(
     team: TeamArrays,
     relaxed: Relaxed,
@@ -231,9 +294,14 @@ def _closed(
     Where they are too many the bound stays as it is.
     """
     n_uav = team.problem.n_uav
-    floor = relaxed.earned - (relaxed.bound - known)
     worthy = worthy_lists(
-        team, relaxed.price, floor, heads=_CLOSING_HEADS, threads=threads, should_stop=stops
+        team,
+        relaxed.price,
+        relaxed.earned,
+        relaxed.bound - known,
+        heads=_CLOSING_HEADS,
+        threads=threads,
+        should_stop=stops,
     )
     if worthy is None or len(worthy.lists) > _MOST_WORTHY:
         return relaxed.bound, None

@@ -1,15 +1,15 @@
 """The best disjoint lists among those that can be part of an optimum: branch and bound.
 
-Given are a bound on J with its prices and all lists that could be part of something better than what
-is known (`swarm.kernels.routes_pricing.worthy_lists`). A branch says who does a task, or who does
-not; its bound is that of the bundle method over the lists left to it. Lists that earn too little for
-anything better are dropped in every branch.
+Given are a bound on J with its prices and all lists that could be part of something better than
+what is known (`swarm.kernels.routes_pricing.worthy_lists`). A branch says who does a task, or who
+does not; its bound is that of the bundle method over the lists left to it. Lists that earn too
+little for anything better are dropped in every branch.
 """
 
 from __future__ import annotations
 
 import heapq
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -144,7 +144,7 @@ class _Search:
             less = bound - value
             if value < bound:
                 bound, price = value, tried
-                bundle.accept()
+                bundle.move_centre(tried)
             if bound <= self._enough() or less < _LEAST_PROGRESS * (bound - self._best):
                 break
             step *= 2.0
@@ -183,7 +183,7 @@ class _Search:
 
 
 def _ranges(starts: IntArray, sizes: IntArray) -> npt.NDArray[np.int64]:
-    """starts[0], …, starts[0] + sizes[0] − 1, starts[1], …"""
+    """Of each start so many numbers from it on, one after another."""
     total = int(sizes.sum())
     before = np.repeat(np.cumsum(sizes) - sizes, sizes)
     return np.arange(total) - before + np.repeat(starts, sizes)

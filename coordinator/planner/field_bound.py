@@ -23,7 +23,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from coordinator.planner.bound import lagrangian_bound
 from coordinator.planner.options import ShouldStop, never

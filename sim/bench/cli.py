@@ -24,6 +24,7 @@ from sim.bench.command_line import (
 from sim.bench.legs import legs
 from sim.bench.performance_commands import (
     autopilot,
+    bound,
     dashboard,
     missions,
     replan,
@@ -220,6 +221,7 @@ def decide(
     return 0
 
 
+bench.command("bound", short_help="Measure how close guided is proven.")(bound)
 bench.command("routes", short_help="Search published instances.")(routes)
 bench.command("failover", short_help="Measure fleets in trouble.")(failover)
 bench.command("flood", short_help="Fly while a hostile peer floods the bus.")(flood)

@@ -1,6 +1,6 @@
-"""The commands `swarm bench turnaround`, `autopilot`, `dashboard`, `missions` and `replan`.
+"""The commands `swarm bench turnaround`, `autopilot`, `dashboard`, `missions`, `replan` and `bound`.
 
-They measure how long things take, and how much one process carries.
+They measure how long things take, how much one process carries, and how much is proven.
 """
 
 from __future__ import annotations
@@ -322,4 +322,50 @@ def replan(
                 Console(file=file, width=100).print(done)
 
         write_file("--out", out, write)
+    return 0
+
+
+def bound(
+    sizes: Annotated[
+        str, typer.Option("--sizes", metavar="NxM,…", help="UAVs and tasks of random missions.")
+    ] = "10x50,50x500",
+    seeds: Annotated[
+        str, typer.Option("--seeds", metavar="N,…", help="Of missions and of the search.")
+    ] = "0,1,2",
+    search_s: Annotated[
+        float,
+        typer.Option(
+            "--search-s",
+            min=0.01,
+            max=LONGEST_S,
+            metavar="S",
+            help="Time for guided: once to find a makespan, once more for the D that follows.",
+        ),
+    ] = 10.0,
+    time_limit_s: Annotated[
+        float,
+        typer.Option(
+            "--time-limit-s", min=0.01, max=LONGEST_S, metavar="S", help="Time for each bound."
+        ),
+    ] = 60.0,
+    json: JsonOption = False,
+) -> int:
+    """Measure how close to the optimum guided lists are proven to be.
+
+    D is 1.5 x the makespan of a first plan, as a long horizon would hide the gap. Where the bound
+    meets the lists they are proven optimal.
+
+    Examples:
+        swarm bench bound --sizes 10x50 --seeds 0,1,2,3,4,5,6,7,8,9
+        swarm bench bound --sizes 200x5000 --seeds 0 --search-s 60 --time-limit-s 300 --json
+    """
+    from sim.bench.bounds import measure_bounds
+    from swarm.runtime.clock import SystemClock
+
+    which, numbers = each("--sizes", sizes, size_of), each("--seeds", seeds, SEED)
+    with progress() as tell:
+        done = measure_bounds(
+            which, numbers, SystemClock(), search_s=search_s, limit_s=time_limit_s, tell=tell
+        )
+    show(done, json=json)
     return 0

@@ -368,6 +368,7 @@ def price_lists(
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
     heads: int,
+    near: int,
     threads: int,
     should_stop: object | None = None,
 ) -> tuple[
@@ -399,9 +400,10 @@ def worthy_lists(
     prices: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
-    floors: Annotated[
+    most: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
     ],
+    slack: float,
     heads: int,
     threads: int,
     should_stop: object | None = None,
@@ -497,7 +499,12 @@ class ListBundle:
     def solve(
         self, step: float, tolerance: float, sweeps: int, should_stop: object | None = None
     ) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
-    def accept(self) -> None: ...
+    def move_centre(
+        self,
+        prices: Annotated[
+            NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+        ],
+    ) -> None: ...
     def value(self) -> float: ...
     def shares(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,))]: ...
 

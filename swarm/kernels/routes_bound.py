@@ -1,7 +1,8 @@
 """Best lists against prices where times do not follow from places; see `coordinator.planner.bound`.
 
-`swarm.kernels.routes_pricing` is closer where they do. For one UAV and a price per task, the best list of Σ p·S₀·m·(D − t)⁺ − price, with times in whole
-buckets, each leg rounded down, S taken as that of the start, and tasks allowed more than once.
+`swarm.kernels.routes_pricing` is closer where they do. For one UAV and a price per task, the best
+list of Σ p·S₀·m·(D − t)⁺ − price, with times in whole buckets, each leg rounded down, S taken as
+that of the start, and tasks allowed more than once.
 From that relaxation a search among real lists may go on, with exact times, S as eq. 1 has it, and
 every task once: best-first, by what a list is worth so far and what the relaxation can still add.
 Where it is cut short, the most that is left counts, so what is found is never below the best

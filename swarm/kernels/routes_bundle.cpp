@@ -1,6 +1,7 @@
 #include "routes_bundle.hpp"
 
 #include <algorithm>
+#include <cstdint>
 #include <utility>
 
 namespace peckorder {

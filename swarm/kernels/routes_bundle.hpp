@@ -12,7 +12,7 @@
 // optimisation: Platt 1998), UAV after UAV.
 #pragma once
 
-#include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "routes_solution.hpp"
@@ -29,8 +29,7 @@ class ListBundle {
   // Moves shares until no UAV could gain more than `tolerance` by it, `sweeps` times at most.
   void solve(double step, double tolerance, long sweeps, Watch& watch);
 
-  // Prices of the last `solve` become the centre.
-  void accept() { centre_ = prices_; }
+  void move_centre(std::vector<double> prices) { centre_ = std::move(prices); }
 
   const std::vector<double>& prices() const { return prices_; }
   double value() const;       // of the sum above without its last term: no bound, but a guess of it

@@ -22,13 +22,13 @@ PricedList Heads::search(long most, Watch& watch) {
     if (head.dropped) continue;
     ++continued;
     if (watch.stops_after(n * 8)) return {};
-    for (int next = 0; next < n; ++next) {
-      if (next == head.task || offer_.knows(head.known, head.task, next, memory)) continue;
+    offer_.for_next(head.task, [&, before = -minus](int next) {
+      if (offer_.knows(head.known, head.task, next, memory)) return;
       const double time_s = head.time_s + offer_.leg_s(head.task, next);
       if (time_s < offer_.latest_s[next])
-        reach({time_s, head.earned, next, -minus,
+        reach({time_s, head.earned, next, before,
                offer_.moved(head.known, head.task, next, memory)});
-    }
+    });
   }
   PricedList found;
   found.bound = std::max(best_, left);

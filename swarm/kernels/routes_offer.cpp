@@ -17,7 +17,10 @@ constexpr double kSoonFrac = 0.02;  // of the time until the horizon
 
 Offer::Offer(const Problem& problem, const Start& start, int uav, const ListPricing& pricing,
              Watch& watch)
-    : left_s(problem.horizon_s() - start.free_s[uav]), problem_(problem), uav_(uav) {
+    : left_s(problem.horizon_s() - start.free_s[uav]),
+      problem_(problem),
+      uav_(uav),
+      near_(pricing.near) {
   choose(start, pricing);
   look_around();
   if (!watch.stops_after(static_cast<std::int64_t>(n()) * 100)) join(watch);
@@ -28,9 +31,9 @@ void Offer::choose(const Start& start, const ListPricing& pricing) {
   for (const int task : pricing.open) {
     if (!problem_.capable(uav_, task)) continue;
     const double first_s = start.travel_s(uav_, task) + problem_.service_s(task);
-    const double most = start.survived[uav_] * problem_.weight(uav_, task) * (left_s - first_s) -
-                        pricing.prices[task];
-    if (most > 0.0) worthy.emplace_back(-most, task);
+    const double weight = start.survived[uav_] * problem_.weight(uav_, task);
+    const double most = weight * (left_s - first_s) - pricing.prices[task] + pricing.slack;
+    if (weight > 0.0 && most > 0.0) worthy.emplace_back(-most, task);
   }
   if (worthy.size() > kMostTasks) {
     std::sort(worthy.begin(), worthy.end());
@@ -43,7 +46,7 @@ void Offer::choose(const Start& start, const ListPricing& pricing) {
     weight.push_back(start.survived[uav_] * problem_.weight(uav_, task));
     price.push_back(pricing.prices[task]);
     first_s.push_back(start.travel_s(uav_, task) + problem_.service_s(task));
-    latest_s.push_back(left_s - price.back() / weight.back());
+    latest_s.push_back(left_s - (price.back() - pricing.slack) / weight.back());
   }
 }
 
@@ -76,19 +79,22 @@ void Offer::look_around() {
 
 void Offer::join(Watch& watch) {
   const int n = this->n();
-  arcs_end_.push_back(0);
-  for (int to = 0; to < n; ++to) {
-    for (int from = 0; from < n; ++from) {
-      if (from == to) continue;
+  std::vector<std::vector<Arc>> into(n);
+  for (int from = 0; from < n; ++from) {
+    for_next(from, [&](int to) {
       const double reach_s = first_s[from] + leg_s(from, to);
-      if (reach_s < latest_s[to]) arcs_.push_back({reach_s, from});
-    }
-    std::sort(arcs_.begin() + static_cast<std::ptrdiff_t>(arcs_end_.back()), arcs_.end(),
-              [](const Arc& a, const Arc& b) {
-                return a.reach_s < b.reach_s || (a.reach_s == b.reach_s && a.from < b.from);
-              });
+      if (reach_s < latest_s[to]) into[to].push_back({reach_s, from});
+    });
+    if (watch.stops_after(near_ == 0 ? n : near_)) return;
+  }
+  arcs_end_.push_back(0);
+  for (std::vector<Arc>& arcs : into) {
+    std::sort(arcs.begin(), arcs.end(), [](const Arc& a, const Arc& b) {
+      return a.reach_s < b.reach_s || (a.reach_s == b.reach_s && a.from < b.from);
+    });
+    arcs_.insert(arcs_.end(), arcs.begin(), arcs.end());
     arcs_end_.push_back(arcs_.size());
-    if (watch.stops_after(n * 2)) return;
+    if (watch.stops_after(static_cast<std::int64_t>(arcs.size()))) return;
   }
 }
 

@@ -1,6 +1,7 @@
 // The tasks that are worth doing to one UAV at given prices, and what it needs for them.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -14,9 +15,10 @@ using Memory = std::uint32_t;
 
 // Times count from when the UAV is free; task indices are those of `tasks`.
 //
-// In the best list of all every task earns something, as by the triangle inequality leaving one out
-// makes no other later. So task i ends between `first_s[i]`, by a flight straight from the start,
-// and `latest_s[i]`, when it would earn nothing; who can never earn anything is left out.
+// By the triangle inequality leaving a task out makes no other later. So in the best list of all
+// every task earns something, and in one that earns less by no more than a slack no task loses more
+// than that. Hence task i ends between `first_s[i]`, by a flight straight from the start, and
+// `latest_s[i]`, when it would lose the slack; tasks that always lose as much are left out.
 class Offer {
  public:
   struct Arc {
@@ -40,6 +42,18 @@ class Offer {
   const Arc* arcs_begin(int to) const { return arcs_.data() + arcs_end_[to]; }
   const Arc* arcs_end(int to) const { return arcs_.data() + arcs_end_[to + 1]; }
 
+  // Whereto legs may lead: use(next), next in ascending order or nearest first.
+  template <typename Use>
+  void for_next(int i, const Use& use) const {
+    if (near_ == 0) {
+      for (int next = 0; next < n(); ++next)
+        if (next != i) use(next);
+    } else {
+      const int* around = &around_[static_cast<std::size_t>(i) * memory_];
+      for (int k = 1; k < std::min(near_ + 1, memory_) && around[k] >= 0; ++k) use(around[k]);
+    }
+  }
+
   // How many of the tasks around it matter to tails that begin with a task, and to beginnings.
   int tail_memory(int i) const { return tail_memory_[i]; }
   int head_memory() const { return memory_; }
@@ -58,6 +72,7 @@ class Offer {
 
   const Problem& problem_;
   int uav_;
+  int near_;
   int memory_ = 1;
   std::vector<int> around_;          // (n, memory_) each task and those nearest to it
   std::vector<std::uint8_t> place_;  // (n, n) 1 + where in the row of `around_`; 0: not there

@@ -60,10 +60,10 @@ std::vector<PricedList> price_lists(const Problem& problem, const Start& start,
 
 std::vector<WorthyLists> worthy_lists(const Problem& problem, const Start& start,
                                       const ListPricing& pricing,
-                                      const std::vector<double>& floors, Watch& watch) {
+                                      const std::vector<double>& most, Watch& watch) {
   std::vector<WorthyLists> found(start.active.size());
   for_active(start, pricing.threads, watch, [&](int uav) {
-    found[uav] = worthy_list(problem, start, uav, pricing, floors[uav], watch);
+    found[uav] = worthy_list(problem, start, uav, pricing, most[uav] - pricing.slack, watch);
   });
   return found;
 }

@@ -20,6 +20,8 @@ struct ListPricing {
   const std::vector<int>& open;       // tasks
   const std::vector<double>& prices;  // (n_task,)
   long heads;                         // beginnings of lists that are continued at most, per UAV
+  int near;                           // legs only to so many tasks nearest to each; 0: to all
+  double slack;                       // tasks that lose no more than this are looked at, too
   int threads;
 };
 
@@ -40,10 +42,10 @@ struct WorthyLists {
   std::vector<double> worth;  // of each, before paying
 };
 
-// Per UAV all real lists, the empty one apart, worth at least its floor after paying; of those with
-// the same tasks the best.
+// Per UAV all real lists, the empty one apart, that earn at least `most` of it less the slack, where
+// no list earns more than `most`; of those with the same tasks the best.
 std::vector<WorthyLists> worthy_lists(const Problem& problem, const Start& start,
                                       const ListPricing& pricing,
-                                      const std::vector<double>& floors, Watch& watch);
+                                      const std::vector<double>& most, Watch& watch);
 
 }  // namespace peckorder

@@ -24,6 +24,7 @@ from swarm.kernels.routes import FloatArray, Routes, TeamArrays, lists_of
 IntArray = npt.NDArray[np.int64]
 ShouldStop = Callable[[], bool]
 
+_MOST_NEAR = 31
 _HEADS = 20_000
 """Beginnings of a list that are continued at most, per UAV: some 50 ms."""
 
@@ -56,6 +57,7 @@ def price_lists(
     price: FloatArray,
     *,
     heads: int = _HEADS,
+    near: int | None = None,
     threads: int | None = None,
     should_stop: ShouldStop | None = None,
 ) -> PricedLists | None:
@@ -66,6 +68,8 @@ def price_lists(
         price: (n_task,) to pay for each visit [value·s]; >= 0.
         heads: beginnings of lists that are continued at most, per UAV; where there are more the
             most that is left counts into the bound.
+        near: legs lead only to so many tasks nearest to each, within 1..31, which is much quicker
+            among thousands; then what is found bounds no other lists.
         threads: at most this many; does not change the result.
         should_stop: asked every few milliseconds whether to give up.
 
@@ -76,8 +80,17 @@ def price_lists(
         ValueError: names the argument that is wrong.
     """
     prices, count = _checked(team, price, heads, threads)
+    if near is not None and not 1 <= near <= _MOST_NEAR:
+        raise ValueError(f"near must be within 1..{_MOST_NEAR}, not {near}")
     done, bound, worth, lists = _kernels.price_lists(
-        team.problem, *team.arguments(), np.asarray(team.open), prices, heads, count, should_stop
+        team.problem,
+        *team.arguments(),
+        np.asarray(team.open),
+        prices,
+        heads,
+        near or 0,
+        count,
+        should_stop,
     )
     return PricedLists(bound, worth, lists_of(*lists)) if done else None
 
@@ -85,18 +98,20 @@ def price_lists(
 def worthy_lists(
     team: TeamArrays,
     price: FloatArray,
-    floor: FloatArray,
+    most: FloatArray,
+    slack: float,
     *,
     heads: int = _HEADS,
     threads: int | None = None,
     should_stop: ShouldStop | None = None,
 ) -> WorthyLists | None:
-    """All lists of active UAVs that earn at least so much, the empty ones apart.
+    """All lists of active UAVs that earn nearly as much as the best, the empty ones apart.
 
     Args:
         team: mission and state.
         price: (n_task,) to pay for each visit [value·s]; >= 0.
-        floor: (n_uav,) that lists have to earn [value·s].
+        most: (n_uav,) no list earns more [value·s].
+        slack: they earn less than that by no more [value·s]; >= 0.
         heads: beginnings of lists that are looked at, at most, per UAV.
         threads: at most this many; does not change the result.
         should_stop: asked every few milliseconds whether to give up.
@@ -108,15 +123,18 @@ def worthy_lists(
         ValueError: names the argument that is wrong.
     """
     prices, count = _checked(team, price, heads, threads)
-    floors = np.array(floor, dtype=np.float64, order="C")
-    if floors.shape != (team.problem.n_uav,) or np.isnan(floors).any():
-        raise ValueError(f"floor must be {team.problem.n_uav} numbers")
+    bests = np.array(most, dtype=np.float64, order="C")
+    if bests.shape != (team.problem.n_uav,) or not np.isfinite(bests).all():
+        raise ValueError(f"most must be {team.problem.n_uav} finite numbers")
+    if not slack >= 0.0:
+        raise ValueError(f"slack must be >= 0, not {slack}")
     complete, uav, worth, lists = _kernels.worthy_lists(
         team.problem,
         *team.arguments(),
         np.asarray(team.open),
         prices,
-        floors,
+        bests,
+        float(slack),
         heads,
         count,
         should_stop,
@@ -171,9 +189,9 @@ class ListBundle:
             raise ValueError("step must be > 0, tolerance >= 0 and sweeps >= 1")
         return self._bundle.solve(step, tolerance, sweeps, should_stop)
 
-    def accept(self) -> None:
-        """Make the prices of the last `solve` the centre."""
-        self._bundle.accept()
+    def move_centre(self, price: FloatArray) -> None:
+        """Look around these prices from now on."""
+        self._bundle.move_centre(np.array(price, dtype=np.float64, order="C"))
 
     @property
     def value(self) -> float:

@@ -47,35 +47,35 @@ void bind_routes_pricing(nb::module_& module) {
       "price_lists",
       [](const Problem& problem, const Vector& free_s, const Matrix& place_m,
          const Vector& survived, const Mask& active, const Mask& open, const Vector& prices,
-         long heads, int threads, nb::handle should_stop) {
+         long heads, int near, int threads, nb::handle should_stop) {
         const StartArrays arrays{free_s, place_m, survived, active};
         const std::vector<int> tasks = open_tasks(open);
         const std::vector<double> price = copied(prices);
         std::vector<PricedList> found;
         bool stopped = false;
         PythonWatch(should_stop).released([&](Watch& watch) {
-          found = price_lists(problem, arrays.start(problem), {tasks, price, heads, threads}, watch);
+          found = price_lists(problem, arrays.start(problem), {tasks, price, heads, near, 0.0, threads}, watch);
           stopped = watch.stopped();
         });
         return given(!stopped, found);
       },
       nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
-      nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("heads"), nb::arg("threads"),
+      nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("heads"), nb::arg("near"), nb::arg("threads"),
       nb::arg("should_stop") = nb::none());
 
   module.def(
       "worthy_lists",
       [](const Problem& problem, const Vector& free_s, const Matrix& place_m,
          const Vector& survived, const Mask& active, const Mask& open, const Vector& prices,
-         const Vector& floors, long heads, int threads, nb::handle should_stop) {
+         const Vector& most, double slack, long heads, int threads, nb::handle should_stop) {
         const StartArrays arrays{free_s, place_m, survived, active};
         const std::vector<int> tasks = open_tasks(open);
-        const std::vector<double> price = copied(prices), floor = copied(floors);
+        const std::vector<double> price = copied(prices), bests = copied(most);
         std::vector<WorthyLists> found;
         bool all = true;
         PythonWatch(should_stop).released([&](Watch& watch) {
-          found = worthy_lists(problem, arrays.start(problem), {tasks, price, heads, threads},
-                               floor, watch);
+          found = worthy_lists(problem, arrays.start(problem), {tasks, price, heads, 0, slack, threads},
+                               bests, watch);
           all = !watch.stopped();
         });
         std::vector<std::int64_t> uavs;
@@ -93,8 +93,8 @@ void bind_routes_pricing(nb::module_& module) {
                                to_arrays(lists));
       },
       nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
-      nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("floors"), nb::arg("heads"),
-      nb::arg("threads"), nb::arg("should_stop") = nb::none());
+      nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("most"), nb::arg("slack"),
+      nb::arg("heads"), nb::arg("threads"), nb::arg("should_stop") = nb::none());
 
   nb::class_<Timetable>(module, "Timetable")
       .def(
@@ -156,7 +156,9 @@ void bind_routes_pricing(nb::module_& module) {
           },
           nb::arg("step"), nb::arg("tolerance"), nb::arg("sweeps"),
           nb::arg("should_stop") = nb::none())
-      .def("accept", &ListBundle::accept)
+      .def("move_centre",
+           [](ListBundle& self, const Vector& prices) { self.move_centre(copied(prices)); },
+           nb::arg("prices"))
       .def("value", &ListBundle::value)
       .def("shares", [](const ListBundle& self) { return give(self.shares()); });
 }

@@ -34,10 +34,12 @@ Tails::Tails(const Offer& offer, Watch& watch)
   }
 }
 
-Tails::Span Tails::useful(int i, const Line& line, Span span) const {
+Tails::Span Tails::useful(int i, const Line& line, Span span, bool sort) {
   if (span.empty()) return span;
   double low = line.a - line.w * span.from_s, high = line.a - line.w * span.until_s;
-  for (const Line& other : lines_[i]) {
+  std::vector<Line>& lines = lines_[i];
+  for (std::size_t k = 0; k < lines.size(); ++k) {
+    const Line& other = lines[k];
     if ((other.known & ~line.known) != 0 || other.born == line.born) continue;
     const double more_low = low - (other.a - other.w * span.from_s);
     const double more_high = high - (other.a - other.w * span.until_s);
@@ -45,6 +47,7 @@ Tails::Span Tails::useful(int i, const Line& line, Span span) const {
     if (more_low <= 0.0 && more_high <= 0.0) {
       const bool equal = more_low == 0.0 && more_high == 0.0 && other.known == line.known;
       if (equal && line.born < other.born) continue;  // of equals the older one stays
+      if (sort) std::swap(lines[k], lines[k / 2]);
       return {0.0, -1.0};
     }
     const double cross_s = (line.a - other.a) / (line.w - other.w);
@@ -92,7 +95,7 @@ void Tails::tidy(int i) {
   const int oldest_coming = coming_[i].front().born;
   coming_[i].clear();
   for (std::size_t k = 0; k < lines.size();) {
-    if (useful(i, lines[k], {offer_.first_s[i], offer_.latest_s[i]}).empty()) {
+    if (useful(i, lines[k], {offer_.first_s[i], offer_.latest_s[i]}, false).empty()) {
       lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(k));
       continue;
     }

@@ -41,8 +41,9 @@ class Tails {
     bool empty() const { return !(from_s <= until_s); }
   };
 
-  // The times of `span` at which no other line of the task is as good.
-  Span useful(int i, const Line& line, Span span) const;
+  // The times of `span` at which no other line of the task is as good. With `sort`
+  // who outdoes the line moves towards the front, where the next one meets it sooner.
+  Span useful(int i, const Line& line, Span span, bool sort = true);
   bool extend(int i, const Line& line, Span span, Watch& watch);
   void tidy(int i);
 

@@ -11,9 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.allocation import Problem, TeamState
-from swarm.allocation.rules import team_at_start
 from swarm.kernels.lower_level import GREEDY, decide
-from swarm.model import Task, TaskId, UavId
+from swarm.model import Task, TaskId
 from tests.support.problems import (
     random_problem,
     table_1,

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from swarm.allocation import TeamState
 from swarm.allocation.rules import team_arrays, team_at_start
-from swarm.kernels.routes_bound import Timetable, priced_lists, shortest_legs_s
-from tests.support.problems import any_problem
+from swarm.kernels.routes_bound import Timetable, relaxed_lists
+from tests.support.problems import any_problem, table_1
 from tests.support.reference import list_worth, timed_list_worth
 
 
@@ -30,14 +30,18 @@ def test_no_list_is_worth_more_after_paying(seed: int, n_task: int, share: float
     team = team_arrays(problem, state, state.active, 0.0)
     price = rng.uniform(0.0, 10.0, n_task)
 
-    worth, visits = priced_lists(team, price, share * shortest_legs_s(team).min())
+    found = relaxed_lists(team, price, share)
 
+    assert found is not None
+    worth = float(found.bound.sum())
     tasks = np.flatnonzero(problem.capable[0]).tolist()
     routes = chain.from_iterable(permutations(tasks, k) for k in range(len(tasks) + 1))
     best = max(list_worth(problem, state, 0, route) - price[list(route)].sum() for route in routes)
     assert worth >= best - 1e-9 * (1.0 + abs(best))
-    assert (visits >= 0).all()
-    assert worth == 0.0 or visits.sum() > 0
+    assert found.lists[1] == []
+    assert (worth > 0.0) == bool(found.lists[0])
+    paid = float(price[found.lists[0]].sum())
+    assert found.worth[0] == pytest.approx(found.bound[0] + paid)
 
 
 def test_with_fine_buckets_one_visit_is_worth_nearly_what_it_is() -> None:
@@ -47,13 +51,13 @@ def test_with_fine_buckets_one_visit_is_worth_nearly_what_it_is() -> None:
     task = int(np.flatnonzero(problem.capable[0])[0])
     state.open[task] = True
     team = team_arrays(problem, state, state.active, 0.0)
-    shortest_s = shortest_legs_s(team).min()
 
-    worth, visits = priced_lists(team, np.zeros(6), shortest_s / 1000.0)
+    found = relaxed_lists(team, np.zeros(6), 1e-3)
 
+    assert found is not None
     real = max(0.0, list_worth(problem, state, 0, [task]))
-    assert real <= worth <= real + problem.weight[0, task] * shortest_s / 1000.0 + 1e-9
-    assert visits[task] == 1 or real == 0.0
+    assert real <= found.bound[0] <= real + problem.weight[0, task] * 1e-3 + 1e-9
+    assert found.lists[0] == ([task] if real > 0.0 else [])
 
 
 def random_timetable(rng: np.random.Generator, n_uav: int, n_task: int) -> Timetable:
@@ -91,8 +95,10 @@ def test_timed_lists_are_bounded_and_searched_as_the_plain_definition_says(
     team = team_at_start(problem)
     price = rng.uniform(0.0, 10.0, n_task)
 
-    worth, visits = priced_lists(team, price, bucket_s, timetable=timetable, expansions=expansions)
+    found = relaxed_lists(team, price, bucket_s, timetable=timetable, expansions=expansions)
 
+    assert found is not None
+    worth = float(found.bound.sum())
     best = 0.0
     for uav in range(2):
         paid = [0.0]
@@ -102,21 +108,19 @@ def test_timed_lists_are_bounded_and_searched_as_the_plain_definition_says(
                 paid.append(value - float(price[list(route)].sum()))
         best += max(paid)
     assert worth >= best - 1e-9 * (1.0 + best)
-    assert (visits >= 0).all()
     if expansions == 10_000:
         assert worth <= best * (1.0 + 1e-4) + 1e-9
-        assert visits.max() <= 2
+        assert all(len(set(one)) == len(one) for one in found.lists)
 
 
 def test_search_among_real_lists_only_lowers_the_bound() -> None:
     problem = any_problem(7, 3, 12)
     team = team_at_start(problem)
-    price, bucket_s = np.full(12, 0.1), shortest_legs_s(team).min() / 2.0
-
-    worths = [
-        priced_lists(team, price, bucket_s, expansions=expansions)[0]
-        for expansions in (0, 10, 100, 10_000)
-    ]
+    worths = []
+    for expansions in (0, 10, 100, 10_000):
+        found = relaxed_lists(team, np.full(12, 0.1), 0.02, expansions=expansions)
+        assert found is not None
+        worths.append(float(found.bound.sum()))
 
     assert worths == sorted(worths, reverse=True)
     assert worths[-1] < worths[0]
@@ -150,7 +154,25 @@ def test_told_to_give_up_it_has_no_answer() -> None:
     team = team_arrays(problem, state, state.active, 0.0)
     bucket_s = problem.horizon_s / 400.0
 
-    worth, visits = priced_lists(team, np.zeros(200), bucket_s, should_stop=lambda: True)
+    assert relaxed_lists(team, np.zeros(200), bucket_s, should_stop=lambda: True) is None
 
-    assert np.isnan(worth)
-    assert not visits.any()
+
+@pytest.mark.parametrize(
+    ("name", "price", "bucket_s", "threads"),
+    [
+        ("price", [1.0], 0.1, 1),
+        ("price", [np.nan] * 8, 0.1, 1),
+        ("price", [-1.0] * 8, 0.1, 1),
+        ("bucket_s", [1.0] * 8, 0.0, 1),
+        ("bucket_s", [1.0] * 8, float("nan"), 1),
+        ("bucket_s", [1.0] * 8, 1e-9, 1),
+        ("threads", [1.0] * 8, 0.1, 0),
+    ],
+)
+def test_wrong_arguments_are_refused_by_name(
+    name: str, price: list[float], bucket_s: float, threads: int
+) -> None:
+    team = team_at_start(table_1())
+
+    with pytest.raises(ValueError, match=name):
+        relaxed_lists(team, np.array(price), bucket_s, threads=threads)

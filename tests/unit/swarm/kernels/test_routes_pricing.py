@@ -1,4 +1,4 @@
-"""Lists against prices, held against all lists; prices that suit lists, against their definition."""
+"""Lists against prices, held against all lists; and prices against what they are to minimise."""
 
 from __future__ import annotations
 
@@ -113,8 +113,8 @@ def test_sixty_tasks_in_one_place_are_bounded_by_what_all_of_them_earn() -> None
 
 
 @settings(deadline=None, max_examples=60)
-@given(seed=st.integers(0, 2**32 - 1), n_task=st.integers(1, 6), share=st.floats(0.0, 1.0))
-def test_no_list_that_earns_enough_is_better_than_the_worthy_ones(
+@given(seed=st.integers(0, 2**32 - 1), n_task=st.integers(1, 6), share=st.floats(0.0, 2.0))
+def test_worthy_lists_are_all_that_earn_nearly_as_much_as_the_best(
     seed: int, n_task: int, share: float
 ) -> None:
     problem, state, team, price = some_state(seed, 2, n_task)
@@ -124,9 +124,9 @@ def test_no_list_that_earns_enough_is_better_than_the_worthy_ones(
             key, worth = tuple(sorted(route)), list_worth(problem, state, uav, route)
             best[uav][key] = max(worth, best[uav].get(key, -np.inf))
     most = [max(w - float(price[list(k)].sum()) for k, w in each.items()) for each in best]
-    floor = share * np.array(most) + 1e-6
+    slack = share * (1.0 + max(most))
 
-    found = worthy_lists(team, price, floor)
+    found = worthy_lists(team, price, np.array(most), slack)
 
     assert found is not None
     said: list[Worths] = [{}, {}]
@@ -135,26 +135,19 @@ def test_no_list_that_earns_enough_is_better_than_the_worthy_ones(
         key = tuple(sorted(one))
         assert key not in said[owner]
         said[owner][key] = worth
-        assert worth <= best[owner][key] + 1e-9
-        assert worth - float(price[one].sum()) >= floor[owner] - 1e-9
     for uav in range(2):
         for key, worth in best[uav].items():
-            earns = worth - float(price[list(key)].sum())
-            if earns < floor[uav]:
-                continue
-            # a list on which some task earns nothing gives way to one without that task
-            others = (
-                other - float(price[list(part)].sum())
-                for part, other in said[uav].items()
-                if set(part) <= set(key)
-            )
-            assert max(others) >= earns - 1e-9
+            more = worth - float(price[list(key)].sum()) - (most[uav] - slack)
+            if key and more > 1e-9:
+                assert said[uav][key] == pytest.approx(worth, rel=1e-9)
+            elif more < -1e-9:
+                assert key not in said[uav]
 
 
 def test_too_many_worthy_lists_are_none() -> None:
     team = team_at_start(random_mission(3, 30, 0))
 
-    assert worthy_lists(team, np.zeros(30), np.zeros(3), heads=50) is None
+    assert worthy_lists(team, np.zeros(30), np.zeros(3), 1.0, heads=50) is None
 
 
 def test_threads_change_no_bit() -> None:
@@ -172,7 +165,7 @@ def test_threads_change_no_bit() -> None:
 
 def test_told_to_give_up_there_is_no_answer() -> None:
     team = team_at_start(random_mission(4, 400, 0))
-    price, floor = np.zeros(400), np.zeros(4)
+    price, most = np.zeros(400), np.zeros(4)
     asked = []
 
     def stop() -> bool:
@@ -180,7 +173,7 @@ def test_told_to_give_up_there_is_no_answer() -> None:
         return True
 
     assert price_lists(team, price, threads=1, should_stop=stop) is None
-    assert worthy_lists(team, price, floor, threads=1, should_stop=stop) is None
+    assert worthy_lists(team, price, most, 0.0, threads=1, should_stop=stop) is None
     assert len(asked) == 2
 
 
@@ -217,14 +210,15 @@ def test_prices_of_a_bundle_are_the_best_near_the_centre(seed: int) -> None:
     assert (np.bincount(uavs, weights=shares, minlength=n_uav) <= 1.0 + 1e-9).all()
 
 
-def test_an_accepted_centre_is_left_behind() -> None:
+def test_from_centre_to_centre_prices_reach_the_best() -> None:
     bundle = ListBundle(2, np.zeros(1))
     bundle.add([0, 1], [10.0, 4.0], [[0], [0]])
 
     prices = []
     for _ in range(20):
-        prices.append(float(bundle.solve(1.0, 1e-12, sweeps=1000)[0]))
-        bundle.accept()
+        price = bundle.solve(1.0, 1e-12, sweeps=1000)
+        bundle.move_centre(price)
+        prices.append(float(price[0]))
 
     assert prices == sorted(prices)
     assert 4.0 - 1e-9 <= prices[-1] <= 10.0 + 1e-9
@@ -254,8 +248,10 @@ def test_wrong_lists_floors_and_steps_are_refused() -> None:
     team = team_at_start(random_mission(2, 5, 0))
     bundle = ListBundle(2, np.zeros(5))
 
-    with pytest.raises(ValueError, match="floor"):
-        worthy_lists(team, np.zeros(5), np.zeros(3))
+    with pytest.raises(ValueError, match="most"):
+        worthy_lists(team, np.zeros(5), np.zeros(3), 1.0)
+    with pytest.raises(ValueError, match="slack"):
+        worthy_lists(team, np.zeros(5), np.zeros(2), -1.0)
     with pytest.raises(ValueError, match="uav"):
         bundle.add([2], [1.0], [[0]])
     with pytest.raises(ValueError, match="lists"):
