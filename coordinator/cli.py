@@ -20,6 +20,7 @@ from swarm.runtime.errors import EXIT_INTERRUPTED, Fault, InputError
 from swarm.runtime.log import LogFormat, LogLevel
 from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import (
+    BoundTimeOption,
     CheckOption,
     JsonOption,
     LifelineOption,
@@ -90,16 +91,7 @@ def plan(
             "on J, which may prove it.",
         ),
     ] = True,
-    bound_s: Annotated[
-        float | None,
-        typer.Option(
-            "--bound-s",
-            min=0.01,
-            metavar="S",
-            help="So long instead, after the search and beyond its time limit.",
-            show_default=False,
-        ),
-    ] = None,
+    bound_s: BoundTimeOption = None,
 ) -> int:
     """Compute the priority sequence, and the task lists it leads to.
 
@@ -126,7 +118,7 @@ def plan(
 
     from coordinator.core.heights import height_warning
     from coordinator.planner.exact import ProblemTooLargeError
-    from coordinator.planner.options import BOUND_S, after_time, bound_frac, first_of
+    from coordinator.planner.options import BOUND_S, after_time, first_of, whole_limit
     from coordinator.planner.plan import make_plan
     from coordinator.planner.plan_report import plan_as_json, plan_table
     from swarm.model.layers import FlightLayers
@@ -143,11 +135,8 @@ def plan(
         require_origin(mission, str(scenario))
     try:
         with _searching() as (interrupted, progress, proving):
-            limit, kept_frac = None, bound_frac(time_limit_s)
-            if time_limit_s is not None:
-                whole_s = time_limit_s + (bound_s or 0.0)
-                limit = after_time(clock, whole_s, begin_s)
-                kept_frac = bound_s / whole_s if bound_s else kept_frac
+            whole_s, kept_frac = whole_limit(time_limit_s, bound_s)
+            limit = None if whole_s is None else after_time(clock, whole_s, begin_s)
             result = make_plan(
                 mission,
                 method,

@@ -56,10 +56,10 @@ def best_disjoint(
         bound: on the sum [value·s].
         should_stop: asked every few milliseconds; then the bound is that of what is left.
     """
-    return _Search(lists, price, n_uav, known, should_stop).run(bound)
+    return _Branches(lists, price, n_uav, known, should_stop).run(bound)
 
 
-class _Search:
+class _Branches:
     def __init__(
         self,
         lists: WorthyLists,

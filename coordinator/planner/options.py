@@ -38,6 +38,19 @@ def bound_frac(time_limit_s: float | None) -> float:
     return min(_BOUND_FRAC, BOUND_S / time_limit_s) if time_limit_s else 0.0
 
 
+def whole_limit(time_limit_s: float | None, bound_s: float | None) -> tuple[float | None, float]:
+    """The time for search and bound together [s], and the share of it kept for the bound.
+
+    Args:
+        time_limit_s: for both, or for the search alone where ``bound_s`` is given [s].
+        bound_s: asked for beyond that [s].
+    """
+    if time_limit_s is None or bound_s is None:
+        return time_limit_s, bound_frac(time_limit_s)
+    whole_s = time_limit_s + bound_s
+    return whole_s, bound_s / whole_s
+
+
 ShouldStop = Callable[[float], bool]
 """Given the evaluations spent so far (a part of one counts as its part), whether to stop; given 0,
 whether to stop whatever is going on."""

@@ -7,12 +7,12 @@ Pop-ups (tasks with ``appears_s > 0``) are unknown to a plan.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from coordinator.planner.bound import UpperBound, meets, upper_bound
+from coordinator.planner.bound import meets, upper_bound
 from coordinator.planner.exact import Optimum, estimated_s, optimum_before
 from coordinator.planner.options import (
     Limit,
@@ -30,7 +30,7 @@ from coordinator.planner.sequence_search import (
     search_sequence,
 )
 from swarm.allocation import RULE_NAMES, Rule, TeamState, evaluate, rank_of, rule_by_name, run
-from swarm.allocation.problem import Problem
+from swarm.allocation.problem import FloatArray, Problem
 from swarm.allocation.rules import GuidedRule, team_arrays, team_at_start
 from swarm.kernels.lower_level import EXACT_TASKS
 from swarm.kernels.routes import TeamArrays, optimise_routes
@@ -217,30 +217,22 @@ def make_plan(
     keeps = proven is None and bound_s is not None and bound_frac > 0.0
     search_ends = part_of(ends, 1.0 - bound_frac) if keeps else ends
     routes, sequence, evaluations = search.lists(proven, search_ends)
-    best, bound = (None if proven is None else evaluate(problem, proven.routes)[0]), None
+    bound = None
     if proven is None and bound_s is not None:
-        found = search.bound(routes, first_of(after_time(clock, bound_s), ends))
-        if method == GuidedRule.name and found.lists is not None:
-            routes, sequence = _better(problem, routes, sequence, found.lists)
-        best, bound = None, found.objective
+        bound_ends = first_of(after_time(clock, bound_s), ends)
+        routes, sequence, bound = search.bounded(routes, sequence, bound_ends)
     objective, completion_s = evaluate(problem, routes)
+    best = None if proven is None else evaluate(problem, proven.routes)[0]
     if bound is not None and meets(bound, objective):
         best, bound = objective, None
-    plan = Plan(
-        scenario=mission.name,
-        method=method if isinstance(method, str) else method.name,
-        routes=_by_id(problem, routes),
+    plan = replace(
+        search.described(mission.name, routes, sequence, completion_s),
         objective=objective,
-        completion_s={
-            problem.task_ids[task]: float(completion_s[task]) for route in routes for task in route
-        },
-        sequence=None if sequence is None else tuple(problem.uav_ids[uav] for uav in sequence),
         # The same lists summed in another order may be 1e-15 off.
         optimum=None if best is None else max(best, objective),
+        bound=bound,
         evaluations=evaluations,
         elapsed_s=clock.now_s() - begin_s,
-        seed=seed,
-        bound=bound,
     )
     if mission.schema == 1:
         return plan
@@ -271,10 +263,44 @@ class _PlanRequest:
             ends = part_of(ends, _PROOF_FRAC)
         return optimum_before(self.problem, lambda: ends(0.0), threads=self.threads)
 
-    def bound(self, routes: Sequence[Sequence[int]], ends: ShouldStop) -> UpperBound:
-        """The least bound on J that is found before `ends`; `routes` are known already."""
-        return upper_bound(
+    def bounded(
+        self,
+        routes: Sequence[Sequence[int]],
+        sequence: tuple[int, ...] | None,
+        ends: ShouldStop,
+    ) -> tuple[Sequence[Sequence[int]], tuple[int, ...] | None, float]:
+        """The least bound on J found before `ends`, and the best lists known by then."""
+        found = upper_bound(
             self.problem, routes, ends, threads=self.threads, progress=self.bound_progress
+        )
+        if self.method == GuidedRule.name and found.lists is not None:
+            routes, sequence = _better(self.problem, routes, sequence, found.lists)
+        return routes, sequence, found.objective
+
+    def described(
+        self,
+        name: str,
+        routes: Sequence[Sequence[int]],
+        sequence: tuple[int, ...] | None,
+        completion_s: FloatArray,
+    ) -> Plan:
+        """The plan of these lists, but for what it is worth and what it took."""
+        problem, method = self.problem, self.method
+        return Plan(
+            scenario=name,
+            method=method if isinstance(method, str) else method.name,
+            routes=_by_id(problem, routes),
+            objective=0.0,
+            completion_s={
+                problem.task_ids[task]: float(completion_s[task])
+                for route in routes
+                for task in route
+            },
+            sequence=None if sequence is None else tuple(problem.uav_ids[uav] for uav in sequence),
+            optimum=None,
+            evaluations=0,
+            elapsed_s=0.0,
+            seed=self.seed,
         )
 
     def lists(

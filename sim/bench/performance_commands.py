@@ -1,4 +1,4 @@
-"""The commands `swarm bench turnaround`, `autopilot`, `dashboard`, `missions`, `replan` and `bound`.
+"""Commands of `swarm bench`: `turnaround`, `autopilot`, `dashboard`, `missions`, `replan`, `bound`.
 
 They measure how long things take, how much one process carries, and how much is proven.
 """

@@ -155,7 +155,10 @@ class ListBundle:
         self._bundle = _kernels.ListBundle(n_uav, np.array(price, dtype=np.float64, order="C"))
 
     def add(
-        self, uav: Sequence[int], worth: Sequence[float], lists: Sequence[Sequence[int]]
+        self,
+        uav: IntArray | Sequence[int],
+        worth: FloatArray | Sequence[float],
+        lists: Sequence[Sequence[int]],
     ) -> None:
         """Get to know a list of each of these UAVs; a task may come on it more than once.
 

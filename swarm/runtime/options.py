@@ -92,6 +92,17 @@ TimeLimitOption = Annotated[
     ),
 ]
 
+BoundTimeOption = Annotated[
+    float | None,
+    typer.Option(
+        "--bound-s",
+        min=0.01,
+        metavar="S",
+        help="Spend S on that bound, beyond the time limit.",
+        show_default=False,
+    ),
+]
+
 LogLevelOption = Annotated[
     LogLevel,
     typer.Option("--log-level", envvar="SWARM_LOG_LEVEL", help="How much to log."),
