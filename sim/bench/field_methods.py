@@ -115,23 +115,19 @@ FIELD_METHODS: dict[str, PlanningMethod[FieldProblem]] = {
     method.name: method
     for method in (
         PlanningMethod(
-            "guided", "lists searched as plans are, on every core", partial(_load_guided, threads=None)
+            "guided",
+            "lists searched as plans are, on every core",
+            partial(_load_guided, threads=None),
         ),
-        PlanningMethod(
-            "guided-1-thread", "the same on one core", partial(_load_guided, threads=1)
-        ),
-        PlanningMethod(
-            "greedy", "the paper's greedy, best sequence found", _load_greedy
-        ),
+        PlanningMethod("guided-1-thread", "the same on one core", partial(_load_guided, threads=1)),
+        PlanningMethod("greedy", "the paper's greedy, best sequence found", _load_greedy),
         PlanningMethod(
             "value-per-time", "index rule, one pass", partial(_load_index, "value-per-time")
         ),
         PlanningMethod(
             "nearest", "what can begin soonest first, one pass", partial(_load_index, "nearest")
         ),
-        PlanningMethod(
-            "cbba", "consensus-based bundle algorithm, no limit", _load_cbba
-        ),
+        PlanningMethod("cbba", "consensus-based bundle algorithm, no limit", _load_cbba),
         PlanningMethod(
             "ortools",
             "OR-Tools routing on one core, from its own start",

@@ -10,16 +10,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sim.bench.field_score import score_in_field
 from sim.bench.machine import MachineInfo, this_machine
 from sim.bench.results import Progress, unheard
-from sim.bench.field_score import score_in_field
 from sim.bench.solvers import (
     MissionSource,
     PlanningJob,
     PlanningRun,
     TracePoint,
+    any_problem_of,
     methods_for,
-    problem_of,
     run_in_subprocess,
 )
 from swarm.allocation import evaluate
@@ -128,7 +128,7 @@ def measure_plans(
     for case, source in sources:
         for seed in seeds:
             drawn = source if source.scenario is not None else replace(source, seed=seed)
-            problem = problem_of(drawn)
+            problem = any_problem_of(drawn)
             if not drawn.field:  # so that it need not be found out again
                 drawn = replace(drawn, horizon_s=problem.horizon_s)
             here: list[PlanMeasurement] = []
@@ -192,9 +192,7 @@ def _measured(
 def _with_ratios(rows: Sequence[PlanMeasurement]) -> list[PlanMeasurement]:
     """The rows of one mission, compared with each other."""
     worths = [
-        (-r.left_out, r.objective)
-        for r in rows
-        if r.objective is not None and r.method != LONG_RUN
+        (-r.left_out, r.objective) for r in rows if r.objective is not None and r.method != LONG_RUN
     ]
     long_runs = [r.objective for r in rows if r.method == LONG_RUN]
     best = max(worths)[1] if worths else None

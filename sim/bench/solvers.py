@@ -82,6 +82,7 @@ class Trace:
         self.points: list[TracePoint] = []
 
     def __call__(self, spent: int, worth: float) -> None:
+        """As a search tells its progress."""
         del spent
         time_s = self._clock.now_s() - self._begin_s
         if not self.points or time_s - self.points[-1][0] >= self._apart_s:
@@ -280,16 +281,16 @@ def methods_for(source: MissionSource) -> Mapping[str, PlanningMethod[Any]]:
     return FIELD_METHODS
 
 
-def problem_of(source: MissionSource) -> Problem | FieldProblem:
+def any_problem_of(source: MissionSource) -> Problem | FieldProblem:
     """The mission's arrays; pop-ups are unknown to a plan."""
     if source.field:
         from sim.bench.field_methods import bench_problem
 
         return bench_problem(source.n_uav, source.n_task, source.seed)
-    return plain_problem_of(source)
+    return problem_of(source)
 
 
-def plain_problem_of(source: MissionSource) -> Problem:
+def problem_of(source: MissionSource) -> Problem:
     """The same of a mission without the field's constraints."""
     if source.scenario is not None:
         return Problem.from_mission(load_scenario(Path(source.scenario)).known_at_start())
@@ -302,7 +303,7 @@ def plain_problem_of(source: MissionSource) -> Problem:
 
 def run_job(job: PlanningJob, clock: Clock) -> PlanningRun:
     """Run a job in this process."""
-    problem = problem_of(job.source)
+    problem = any_problem_of(job.source)
     solve = methods_for(job.source)[job.method].load()
     base_bytes = peak_memory_bytes()
     begin_cpu_s, begin_s = _cpu_s(), clock.now_s()

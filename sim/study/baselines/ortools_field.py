@@ -31,7 +31,7 @@ _LEEWAY_MS = 10
 _LARGEST_WEIGHT = 10_000
 _TRAVEL_SHARE = 0.1
 """What a second of travel costs, as a share of what a second of delay of an average task does."""
-_VISITS_PER_UAV = 4
+_VISITS_PER_UAV = 5
 """To bases, on average."""
 _NO_WAY_S = 1e7
 _LONGEST_SHARE = 3.0
@@ -49,6 +49,8 @@ def refusal(problem: FieldProblem) -> str | None:
         return "OR-Tools has no words for losses"
     if problem.is_line.any():
         return "its model here knows no lines"
+    if (problem.full_s != problem.full_s[:1]).any():
+        return "its model here knows one kind of battery"
     if ((problem.slots > 0) & (problem.slots < problem.n_uav)).any():
         return "its model here knows no slots at bases"
     return None
@@ -95,7 +97,9 @@ class _Stops:
         return cls(
             task=np.concatenate([tasks, np.full(len(visits), -1)]).astype(np.int32),
             base=np.concatenate([np.full(len(tasks), -1), visits]).astype(np.int32),
-            place=np.concatenate([problem.enter[tasks, 0], problem.n_uav + visits]).astype(np.int32),
+            place=np.concatenate([problem.enter[tasks, 0], problem.n_uav + visits]).astype(
+                np.int32
+            ),
             work_s=np.concatenate([problem.service_s[tasks], problem.swap_s[visits]]),
         )
 
@@ -158,33 +162,43 @@ class _Model:
             routing.AddDisjunction([index], int(worth[task]) + (dearest if required else 0))
 
     def _add_energy(self) -> None:
-        """Its cumul is the airborne time used since the last swap; slack at a base makes it 0."""
+        """Its cumul is the airborne time since the last swap.
+
+        At a base it is the whole battery, whatever was left: slack before it burns the rest. What
+        leaves a base takes that off again. Filters of the local search see all of that; what they
+        do not see is that waiting in the air is airborne time too.
+        """
         problem, routing, manager = self._problem, self._routing, self._manager
-        most = np.where(np.isfinite(problem.full_s), problem.full_s, problem.horizon_s * 10.0)
-        full_ms = _ms(most) + _LEEWAY_MS
-        largest_ms = int(full_ms.max())
+        full_ms = int(problem.full_s[0] * _MS_PER_S) + _LEEWAY_MS
         transits = []
         for uav in range(problem.n_uav):
             used_ms = _ms(_used_s(problem, self._stops, uav))
-            used_ms[1:][self._stops.base >= 0] -= largest_ms  # to which slack has raised it there
+            used_ms[1:][self._stops.base >= 0] -= full_ms
             transits.append(routing.RegisterTransitMatrix(used_ms.tolist()))
-        routing.AddDimensionWithVehicleTransitAndCapacity(
-            transits, 2 * largest_ms, full_ms.tolist(), False, "energy"
-        )
+        routing.AddDimensionWithVehicleTransits(transits, full_ms, full_ms, False, "energy")
         energy, time = routing.GetDimensionOrDie("energy"), routing.GetDimensionOrDie("time")
         add = routing.solver().Add
+        aloft = [routing.Start(uav) for uav in range(problem.n_uav)]
+        for uav, index in enumerate(aloft):
+            begun_ms = int((problem.full_s[uav] - problem.first_s[uav]) * _MS_PER_S)
+            energy.CumulVar(index).SetRange(begun_ms, begun_ms)
         for node, base in enumerate(self._stops.base.tolist(), start=1):
             index = manager.NodeToIndex(node)
             if base >= 0:
-                add(energy.CumulVar(index) + energy.SlackVar(index) == largest_ms)
+                energy.CumulVar(index).SetRange(full_ms, full_ms)
             else:
-                add(energy.SlackVar(index) == time.SlackVar(index))
-        for uav in range(problem.n_uav):
-            index = routing.Start(uav)
-            add(energy.SlackVar(index) == time.SlackVar(index))
-            begun = problem.full_s[uav] - problem.first_s[uav]
-            begun_ms = int(begun * _MS_PER_S) if np.isfinite(begun) else 0
-            energy.CumulVar(index).SetRange(begun_ms, begun_ms)
+                aloft.append(index)
+        for index in aloft:
+            add(energy.SlackVar(index) >= time.SlackVar(index))
+        # It waits for what opens, and not before bases or what is open.
+        longest_ms = [0] * (routing.Size() + problem.n_uav)
+        for node, task in enumerate(self._stops.task.tolist(), start=1):
+            if task >= 0:
+                opens_ms = int(max(0.0, problem.opens_s[task]) * _MS_PER_S)
+                longest_ms[manager.NodeToIndex(node)] = opens_ms
+        for index in range(routing.Size()):
+            longest = routing.solver().Element(longest_ms, routing.NextVar(index))
+            add(time.SlackVar(index) <= longest + _LEEWAY_MS)
 
     def stated(self, lists: Sequence[Sequence[int]]) -> list[list[int]]:
         """Nodes of lists of items, as far as there are enough visits to bases."""
@@ -201,9 +215,7 @@ class _Model:
                 stated[-1].append(node[item >> 1] if item >= 0 else visits[-1 - item].pop(0))
         return stated
 
-    def solved(
-        self, limit_s: float, start: list[list[int]] | None
-    ) -> tuple[tuple[int, ...], ...]:
+    def solved(self, limit_s: float, start: list[list[int]] | None) -> tuple[tuple[int, ...], ...]:
         """Lists of items after so long."""
         routing = self._routing
         parameters = _parameters(limit_s)
@@ -264,7 +276,7 @@ def _parameters(limit_s: float) -> Any:
 
     parameters = pywrapcp.DefaultRoutingSearchParameters()
     parameters.first_solution_strategy = (
-        routing_enums_pb2.FirstSolutionStrategy.LOCAL_CHEAPEST_COST_INSERTION
+        routing_enums_pb2.FirstSolutionStrategy.PARALLEL_CHEAPEST_INSERTION
     )
     parameters.local_search_metaheuristic = (
         routing_enums_pb2.LocalSearchMetaheuristic.GUIDED_LOCAL_SEARCH
