@@ -56,6 +56,14 @@ OnList on_list(const FieldProblem& problem, int uav, int task) {
     return on;
 }
 
+void prefetch(const double* place) {
+#if defined(__GNUC__)
+    __builtin_prefetch(place);
+#else
+    static_cast<void>(place);
+#endif
+}
+
 // Of the labels after so many tasks.
 double earliest_s(const FieldList& list, std::size_t count) {
     double time_s = kInfinity;
@@ -255,8 +263,8 @@ void ListSolver::fetch(const FieldList& list, int task) const {
     const double* legs_s = problem_.legs_from(list.uav, enter);
     for (const Item item : list.order) {
         const int node = problem_.enter_node(item);
-        __builtin_prefetch(legs_s + node);
-        __builtin_prefetch(problem_.legs_from(list.uav, problem_.leave_node(item)) + enter);
+        prefetch(legs_s + node);
+        prefetch(problem_.legs_from(list.uav, problem_.leave_node(item)) + enter);
     }
 }
 
