@@ -33,8 +33,6 @@ _SLICES = 64
 _FEWEST_IN_SLICE = 20
 _COOL_START = 0.3
 """Heat while it is unknown how long the search will be."""
-_WARM_HEAT = 0.3
-"""From which lists of thousands of tasks are cooled if they were given to begin with."""
 _FIRST_POLISH_FRAC, _LAST_POLISH_FRAC = 0.3, 0.02
 """Of a limit in time, the most that local search may take before the annealing, and what is kept
 for it afterwards."""
@@ -174,7 +172,6 @@ def optimise_routes(
     if full > 0.0:
         search.polish(lambda: not time_spent_frac() < _FIRST_POLISH_FRAC)
     lanes = search.n_lane()
-    hottest = 1.0 if lists is None or full > 0.0 else _WARM_HEAT
     most = search.most_iterations()
     done = 0
     while True:
@@ -188,7 +185,7 @@ def optimise_routes(
         now = max(_FEWEST_IN_SLICE, min(most, int(total / lanes / _SLICES)))
         if iterations is not None:
             now = min(now, -(-(iterations - done) // lanes))
-        heat = hottest * _heat(max(0.0, spent), total, full)
+        heat = _heat(max(0.0, spent), total, full)
         search.round(now, heat, threads or os.cpu_count() or 1, _ending(spent_frac))
         done += now * lanes
         if progress is not None:

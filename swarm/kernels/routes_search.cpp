@@ -5,7 +5,6 @@
 namespace peckorder {
 
 namespace {
-constexpr double kMeanTorn = 10.0;
 constexpr double kLongestString = 10.0;
 constexpr double kSplitShare = 0.5;
 constexpr double kSplitDepth = 0.01;
@@ -36,9 +35,10 @@ void insert_missing(Solution& solution, const std::vector<int>& tasks) {
   }
 }
 
-Search::Search(const Problem& problem, const Start& start, std::uint64_t seed)
+Search::Search(const Problem& problem, const Start& start, std::uint64_t seed, double mean_torn)
     : current_(problem, start),
       random_(seed),
+      mean_torn_(mean_torn),
       best_(problem.n_uav()),
       is_unsaved_(problem.n_uav(), 0),
       is_touched_(problem.n_uav(), 0),
@@ -77,7 +77,7 @@ bool Search::blinks() {
 void Search::ruin() {
   const int mean_length = std::max(1, static_cast<int>(tasks_.size() / uavs().size()));
   const double longest = std::min(kLongestString, static_cast<double>(mean_length));
-  const double most_strings = 4.0 * kMeanTorn / (1.0 + longest) - 1.0;
+  const double most_strings = 4.0 * mean_torn_ / (1.0 + longest) - 1.0;
   const int strings = static_cast<int>(random_.uniform() * most_strings + 1.0);
   const int seed = tasks_[random_.below(static_cast<int>(tasks_.size()))];
   const Problem& problem = current_.problem();

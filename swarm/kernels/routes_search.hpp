@@ -23,7 +23,9 @@ void insert_missing(Solution& solution, const std::vector<int>& tasks);
 
 class Search : public Lane {
  public:
-  Search(const Problem& problem, const Start& start, std::uint64_t seed);
+  // A ruin takes `mean_torn` tasks on average.
+  Search(const Problem& problem, const Start& start, std::uint64_t seed,
+         double mean_torn = kMeanTorn);
 
   // Work on the lists of these UAVs alone; best := current.
   void load(const std::vector<Route>& routes, const std::vector<int>& uavs) override;
@@ -42,8 +44,11 @@ class Search : public Lane {
   void keep_copy(int uav);
   bool blinks();
 
+  static constexpr double kMeanTorn = 15.0;
+
   Solution current_;
   Random random_;
+  double mean_torn_;
   int until_blink_ = 1;  // places looked at till the next that is overlooked
   double best_value_ = 0.0;
   std::vector<Route> best_;

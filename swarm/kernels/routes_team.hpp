@@ -16,6 +16,14 @@
 
 namespace peckorder {
 
+// How a search cools.
+struct Annealing {
+  double hottest;  // of the mean delay
+  double ratio;    // of one temperature to the one before, of 65
+  double iterations_for_full_heat;  // per task; see TeamSearch
+  double torn;     // tasks that a ruin takes on average; of no matter to long lists
+};
+
 class TeamSearch {
  public:
   // Long lists on which nobody is lost are searched by GranularSearch, others by Search. `given` may
@@ -33,7 +41,7 @@ class TeamSearch {
   // Iterations per lane that take some 10 ms, and per task that an annealing from full heat takes.
   // 0: it pays with however few, and gets as far as local search in less time.
   long most_iterations() const { return most_iterations_; }
-  double iterations_for_full_heat() const { return iterations_for_full_heat_; }
+  double iterations_for_full_heat() const { return annealing_.iterations_for_full_heat; }
 
   // Local search on the best lists, until no move gains or the watch stops it; the search goes on
   // from there.
@@ -65,8 +73,7 @@ class TeamSearch {
   double best_value_;
   double hottest_;
   long most_iterations_;
-  double iterations_for_full_heat_;
-  double heat_ratio_;
+  Annealing annealing_;
 };
 
 }  // namespace peckorder
