@@ -59,6 +59,7 @@ _ROUNDING = 2e-10
 _MET = 1e-9
 _CLOSING_HEADS = 100_000
 """Beginnings of lists looked at, per UAV, when those that might be part of an optimum are named."""
+_FIRST_SLACK_FRAC, _WIDER = 2e-4, 3.0
 _MOST_WORTHY = 50_000
 """Lists that are chosen from."""
 
@@ -289,31 +290,44 @@ def _closed(
     stops: Callable[[], bool],
     threads: int | None,
 ) -> tuple[float, tuple[tuple[int, ...], ...] | None]:
-    """The optimum over disjoint lists and lists that reach it, where these can be named.
+    """A bound over disjoint lists, and lists that reach it where they were not known.
 
-    Where they are too many the bound stays as it is.
+    Step by step farther below the bound of the prices: what is worth more than bound - slack is
+    made of lists that lose no more than the slack. Where these are too many it ends.
     """
     n_uav = team.problem.n_uav
-    worthy = worthy_lists(
-        team,
-        relaxed.price,
-        relaxed.earned,
-        relaxed.bound - known,
-        heads=_CLOSING_HEADS,
-        threads=threads,
-        should_stop=stops,
-    )
-    if worthy is None or len(worthy.lists) > _MOST_WORTHY:
-        return relaxed.bound, None
-    found = best_disjoint(
-        worthy, relaxed.price, n_uav, known=known, bound=relaxed.bound, should_stop=stops
-    )
+    lowest, slack = relaxed.bound, _FIRST_SLACK_FRAC * abs(relaxed.bound)
+    while True:
+        slack = min(slack, relaxed.bound - known)
+        worthy = worthy_lists(
+            team,
+            relaxed.price,
+            relaxed.earned,
+            slack,
+            heads=_CLOSING_HEADS,
+            threads=threads,
+            should_stop=stops,
+        )
+        if worthy is None or len(worthy.lists) > _MOST_WORTHY:
+            return lowest, None
+        found = best_disjoint(
+            worthy,
+            relaxed.price,
+            n_uav,
+            known=max(known, relaxed.bound - slack),
+            bound=lowest,
+            should_stop=stops,
+        )
+        lowest = min(lowest, found.bound)
+        if found.chosen is not None or slack >= relaxed.bound - known or stops():
+            break
+        slack *= _WIDER
     if found.chosen is None:
-        return found.bound, None
+        return lowest, None
     better: list[tuple[int, ...]] = [()] * n_uav
     for k in found.chosen:
         better[int(worthy.uav[k])] = tuple(worthy.lists[k])
-    return found.bound, tuple(better)
+    return lowest, tuple(better)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -32,12 +32,17 @@ PricedList Heads::search(long most, Watch& watch) {
   }
   PricedList found;
   found.bound = std::max(best_, left);
-  found.worth = best_;
-  for (int k = best_head_; k >= 0; k = heads_[k].before) {
-    found.worth += offer_.price[heads_[k].task];
+  // Cut short, the list that may be as good as the bound tells more than the best one found.
+  const int last = left > best_ ? -open_.top().second : best_head_;
+  for (int k = last; k >= 0; k = heads_[k].before)
     found.list.push_back(offer_.tasks[heads_[k].task]);
-  }
   std::reverse(found.list.begin(), found.list.end());
+  if (left > best_) {
+    const Head& head = heads_[last];
+    tails_.append_best(head.task, head.time_s, head.known, found.list);
+  }
+  found.worth = found.bound;
+  for (const int task : found.list) found.worth += offer_.price_of(task);
   return found;
 }
 

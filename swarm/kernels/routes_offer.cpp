@@ -19,6 +19,7 @@ Offer::Offer(const Problem& problem, const Start& start, int uav, const ListPric
              Watch& watch)
     : left_s(problem.horizon_s() - start.free_s[uav]),
       problem_(problem),
+      prices_(pricing.prices),
       uav_(uav),
       near_(pricing.near) {
   choose(start, pricing);

@@ -38,6 +38,8 @@ class Offer {
   double leg_s(int from, int to) const { return problem_.leg_s(uav_, tasks[from], tasks[to]); }
   double gain(int i, double time_s) const { return weight[i] * (left_s - time_s) - price[i]; }
 
+  double price_of(int task) const { return prices_[task]; }  // of all tasks, not of `tasks`
+
   // Arcs into a task along which it can end before `latest_s`, soonest first.
   const Arc* arcs_begin(int to) const { return arcs_.data() + arcs_end_[to]; }
   const Arc* arcs_end(int to) const { return arcs_.data() + arcs_end_[to + 1]; }
@@ -71,6 +73,7 @@ class Offer {
   void join(Watch& watch);
 
   const Problem& problem_;
+  const std::vector<double>& prices_;
   int uav_;
   int near_;
   int memory_ = 1;

@@ -27,8 +27,8 @@ struct ListPricing {
 
 struct PricedList {
   double bound = 0.0;  // no list is worth more after paying
-  double worth = 0.0;  // before paying, of the best list found
-  Route list;          // it; a task may come twice
+  double worth = 0.0;  // before paying, of the list
+  Route list;          // the best, or one that might be: a task may come twice on it
 };
 
 // One per UAV, the inactive ones included. The same for any number of threads; of no use once the

@@ -36,9 +36,9 @@ class PricedLists:
     bound: FloatArray
     """(n_uav,) no list earns more [value·s]; >= 0."""
     worth: FloatArray
-    """(n_uav,) Σ S₀·p·m·(D − t) of the lists found, before paying [value·s]."""
+    """(n_uav,) Σ S₀·p·m·(D − t) of these lists, before paying [value·s]."""
     lists: Routes
-    """These lists; a task may come more than once."""
+    """Those that earn as much as the bound, or may do so; a task may come more than once."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)

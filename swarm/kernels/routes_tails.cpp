@@ -5,7 +5,7 @@
 namespace peckorder {
 
 namespace {
-constexpr int kMostBorn = 300'000;
+constexpr std::size_t kMostBorn = 300'000;
 }  // namespace
 
 Tails::Tails(const Offer& offer, Watch& watch)
@@ -13,7 +13,8 @@ Tails::Tails(const Offer& offer, Watch& watch)
   const int n = offer_.n();
   for (int i = 0; i < n; ++i) {
     const double w = offer_.weight[i];
-    lines_[i].push_back({w * offer_.left_s - offer_.price[i], w, 1, born_++});
+    lines_[i].push_back({w * offer_.left_s - offer_.price[i], w, 1, i});
+    nodes_.push_back({i, -1});
     coming_[i] = lines_[i];
   }
   // In round r those of r tasks; a real list has n at most.
@@ -32,6 +33,20 @@ Tails::Tails(const Offer& offer, Watch& watch)
     for (int i = 0; i < n; ++i)
       if (!coming_[i].empty()) tidy(i);
   }
+}
+
+void Tails::append_best(int i, double time_s, Memory known, Route& list) const {
+  double best = offer_.gain(i, time_s);
+  int at = -1;
+  for (const Line& line : lines_[i]) {
+    const double earned = line.a - line.w * time_s;
+    if ((line.known & known & ~Memory{1}) != 0 || !(earned > best)) continue;
+    best = earned;
+    at = line.born;
+  }
+  if (at < 0) return;
+  for (int k = nodes_[at].next; k >= 0; k = nodes_[k].next)
+    list.push_back(offer_.tasks[nodes_[k].task]);
 }
 
 Tails::Span Tails::useful(int i, const Line& line, Span span, bool sort) {
@@ -77,10 +92,12 @@ bool Tails::extend(int i, const Line& line, Span span, Watch& watch) {
                    std::min(offer_.latest_s[h], until_s - leg_s)};
     if (own.empty()) continue;
     const Line longer{line.a - line.w * leg_s + w * offer_.left_s - offer_.price[h], line.w + w,
-                      offer_.moved(line.known, i, h, offer_.tail_memory(h)), born_};
+                      offer_.moved(line.known, i, h, offer_.tail_memory(h)),
+                      static_cast<int>(nodes_.size())};
     steps += static_cast<std::int64_t>(lines_[h].size()) / 4 + 2;
     if (useful(h, longer, own).empty()) continue;
-    if (++born_ > kMostBorn) overflown_ = true;
+    nodes_.push_back({h, line.born});
+    if (nodes_.size() > kMostBorn) overflown_ = true;
     lines_[h].push_back(longer);
     coming_[h].push_back(longer);
     any = true;

@@ -30,11 +30,17 @@ class Tails {
     return best;
   }
 
+  // The tasks of that tail after `i`.
+  void append_best(int i, double time_s, Memory known, Route& list) const;
+
  private:
   struct Line {
     double a, w;
     Memory known;
-    int born;  // in order
+    int born;  // in order, and where it stands in `nodes_`
+  };
+  struct Node {
+    int task, next;  // `next` in nodes_
   };
   struct Span {
     double from_s, until_s;
@@ -50,7 +56,7 @@ class Tails {
   const Offer& offer_;
   std::vector<std::vector<Line>> lines_;   // per first task
   std::vector<std::vector<Line>> coming_;  // those of `lines_` not yet looked at
-  int born_ = 0;
+  std::vector<Node> nodes_;
   bool overflown_ = false;
 };
 

@@ -91,6 +91,8 @@ def test_cut_short_it_still_bounds_all_lists(seed: int, heads: int) -> None:
     assert found is not None
     best = max(earned(problem, state, 0, one, price) for one in all_lists(problem, state, 0))
     assert found.bound[0] >= best - 1e-9 * (1.0 + best)
+    paid = float(price[found.lists[0]].sum())
+    assert found.worth[0] == pytest.approx(found.bound[0] + paid)
     assert found.bound[1] == 0.0
     assert found.lists[1] == []
 
