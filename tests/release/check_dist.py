@@ -114,6 +114,7 @@ def shipped(tracked: Sequence[str]) -> set[str]:
         if name.startswith(tuple(f"{package}/" for package in PACKAGES))
         and not name.endswith((".cpp", ".hpp", ".md", "CMakeLists.txt"))
         and "/screenshots/" not in name
+        and "/published/" not in name
     }
 
 

@@ -88,7 +88,7 @@ def test_the_nearest_name_is_meant_and_all_are_told() -> None:
         ("autopilot table-1 --uav uvv1", "did you mean 'uav1'?"),
         ("simulate table-1 --faults cuts", "did you mean 'cut'?"),
         ("plan table-1 --methd greedy", "did you mean --method"),
-        ("bench pln", "did you mean 'plan'?"),
+        ("bench pln", "did you mean 'plan', 'replan'?"),
     ],
 )
 def test_a_mistyped_name_is_guessed(
