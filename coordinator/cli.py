@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from coordinator.plan_options import USUAL_FIRMWARE, check_plan_options
 from coordinator.planner.options import method_names, online_method_names
 from swarm.bus.connection import DEFAULT_CONNECTION, ConnectionOptions
 from swarm.protocol.timing import Timing
@@ -45,8 +46,6 @@ if TYPE_CHECKING:
     from swarm.model import Mission, Plan
     from swarm.protocol.messages import Snapshot
     from swarm.runtime.store import Store
-
-_USUAL_FIRMWARE = "ardupilot"
 
 
 def plan(
@@ -82,7 +81,7 @@ def plan(
     firmware: Annotated[
         str,
         typer.Option(metavar="ardupilot|px4", help="What the exported plans are to be flown by."),
-    ] = _USUAL_FIRMWARE,
+    ] = USUAL_FIRMWARE,
     bound: Annotated[
         bool,
         typer.Option(
@@ -124,7 +123,7 @@ def plan(
     from swarm.model.layers import FlightLayers
     from swarm.scenario import load_scenario, require_plain
 
-    _check_plan_options(method, plot, firmware)
+    check_plan_options(method, plot, firmware, None if bound else bound_s)
     mission = load_scenario(scenario)
     if (warning := height_warning(mission, FlightLayers())) is not None:
         print(f"warning: {warning}", file=sys.stderr)
@@ -458,41 +457,3 @@ async def _work(
                 print(f"{stood_down}; add --standby to wait for its loss", file=sys.stderr)
     # Whoever supervises it must not take a mission's end for a failure, and fly it again.
     return 0 if SERVICE_NOTIFIER.supervised else status
-
-
-def _check_plan_options(method: str, plot: Path | None, firmware: str) -> None:
-    """Refuse what cannot be done before any work is done."""
-    from swarm.runtime.errors import remedy_for_name
-
-    faults = []
-    methods = method_names()
-    if method not in methods:
-        remedy = remedy_for_name(method, methods)
-        faults.append(Fault("--method", method, "no such method", remedy))
-    if plot is not None:
-        faults += _plot_faults(plot)
-    if firmware != _USUAL_FIRMWARE:
-        faults += _firmware_faults(firmware)
-    if faults:
-        raise InputError(*faults)
-
-
-def _plot_faults(plot: Path) -> Iterator[Fault]:
-    from coordinator.plot import PLOT_SUFFIXES
-    from swarm.runtime.extras import require_extra
-
-    if plot.suffix.lower() in PLOT_SUFFIXES:
-        require_extra("ground", "--plot")
-        return
-    problem = f"no picture is called {plot.suffix!r}" if plot.suffix else "it has no suffix"
-    yield Fault("--plot", str(plot), problem, f"end it in {', '.join(PLOT_SUFFIXES)}")
-
-
-def _firmware_faults(firmware: str) -> Iterator[Fault]:
-    from coordinator.export import ExportFirmware
-    from swarm.runtime.errors import remedy_for_name
-
-    firmwares = [known.value for known in ExportFirmware]
-    if firmware not in firmwares:
-        remedy = remedy_for_name(firmware, firmwares)
-        yield Fault("--firmware", firmware, "no such firmware", remedy)

@@ -169,7 +169,12 @@ class BackgroundPlanner:
                 self._wanted, self._unwanted = None, (unwanted := threading.Event())
                 call = partial(self._outcome, request, _once_set(unwanted))
                 name = "planner" if isinstance(request, MakePlan) else "replanner"
-                outcome = await asyncio.wrap_future(call_in_background(call, name))
+                try:
+                    outcome = await asyncio.wrap_future(call_in_background(call, name))
+                except Exception:
+                    if not unwanted.is_set():
+                        raise
+                    continue
                 if not unwanted.is_set():
                     self._tell(outcome)
         finally:  # before anybody else has a turn, who would not be heard any more

@@ -28,7 +28,7 @@ from functools import partial
 import numpy as np
 
 from coordinator.planner.closing import best_disjoint
-from coordinator.planner.options import ShouldStop, never, part_of
+from coordinator.planner.options import ShouldStop, beginning_of, never
 from swarm.allocation.problem import FloatArray, Problem
 from swarm.allocation.rules import team_at_start
 from swarm.kernels.routes import TeamArrays
@@ -150,7 +150,7 @@ def upper_bound(
 
     known = _Known.of(problem, lists)
     price, bundle = known.price, known.bundle(problem.n_uav)
-    price = _approached(team, price, bundle, part_of(should_stop, _ROUGH_FRAC), threads)
+    price = _approached(team, price, bundle, beginning_of(should_stop, _ROUGH_FRAC), threads)
     heads = max(_FEWEST_HEADS, _HEADS_TIMES_TASKS // problem.n_task)
     relaxed = lagrangian_bound(
         partial(price_lists, team, heads=heads, threads=threads, should_stop=stops),

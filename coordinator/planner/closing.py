@@ -23,6 +23,8 @@ _TOLERANCE = 2e-10
 _STEPS = 12
 """Of the bundle method in a branch, at most."""
 _SWEEPS = 200
+_MOST_HELD = 25_000_000
+"""Lists that open branches have left, all together: 200 MB. With more it ends as if stopped."""
 _LEAST_PROGRESS = 0.05
 """Of what a branch's bound is above the best known: a step that lowers it by less is the last."""
 
@@ -77,17 +79,24 @@ class _Branches:
         self._price = price
         self._step = max(1e-9, 0.1 * float(price.mean()))
         self._open: list[tuple[float, int, IntArray, FloatArray]] = []
-        self._made = 0
+        self._made = self._held = 0
 
     _chosen: tuple[int, ...] | None
 
     def run(self, bound: float) -> Disjoint:
-        self._push(bound, np.arange(len(self._lists.lists)), self._price)
+        # In the best choice none is worth less than nothing: without it the others are as good.
+        some = np.flatnonzero(self._lists.worth > 0.0)
+        self._push(bound, some, self._price)
         while self._open:
             minus, _, left, price = heapq.heappop(self._open)
+            self._held -= len(left)
             if -minus <= self._enough():
                 break
-            if self._should_stop() or not self._branch(-minus, left, price):
+            if (
+                self._held > _MOST_HELD
+                or self._should_stop()
+                or not self._branch(-minus, left, price)
+            ):
                 return Disjoint(max(-minus, self._enough()), self._chosen)
         return Disjoint(self._enough(), self._chosen)
 
@@ -96,6 +105,7 @@ class _Branches:
 
     def _push(self, bound: float, left: IntArray, price: FloatArray) -> None:
         self._made += 1
+        self._held += len(left)
         heapq.heappush(self._open, (-bound, self._made, left, price))
 
     def _branch(self, bound: float, left: IntArray, price: FloatArray) -> bool:

@@ -28,6 +28,8 @@ Items = Sequence[Sequence[int]]
 _SEARCH_ITERATIONS_PER_TASK = 100
 _GOING_ON_ITERATIONS = 200
 """About what a decision online spends."""
+_ITERATIONS_PER_MISSING_TASK = 2
+"""Beside these: two lanes share them, and each places one missing task at a time."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -149,9 +151,12 @@ def worth_to_go(standing: FieldStanding, routes: Mapping[str, Sequence[str]]) ->
 
 
 def _searched(standing: FieldStanding, begin: Items, stop: ShouldStop = never) -> FieldCourse:
+    listed = sum(item >= 0 for items in begin for item in items)
+    missing = max(0, int(np.count_nonzero(standing.state.open)) - listed)
+    most = _GOING_ON_ITERATIONS + _ITERATIONS_PER_MISSING_TASK * missing
     plan = field_guided_plan(
         standing.problem,
-        stop=first_of(stop, after_evaluations(_GOING_ON_ITERATIONS)),
+        stop=first_of(stop, after_evaluations(most)),
         state=standing.state,
         lists=begin,
         threads=1,

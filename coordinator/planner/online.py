@@ -420,8 +420,8 @@ def complete_lists(situation: Situation, new: Lists) -> Lists:
 def worth_to_go(situation: Situation, lists: Lists) -> tuple[int, float]:
     """Required tasks left out, and J of what is open, if UAVs keep to ``lists`` from here on.
 
-    Closed tasks are skipped; tasks of no UAV taking part are put where J gains most. Far cheaper
-    than `predicted`. Without the field's constraints none is left out; J is in value·s.
+    Closed tasks are skipped; tasks of no UAV taking part are put where a decision would put them.
+    Far cheaper than `predicted`. Without the field's constraints none is left out; J is in value·s.
     """
     state = situation.state
     if situation.is_settled:

@@ -107,6 +107,17 @@ def part_of(stop: ShouldStop, frac: float) -> ShouldStop:
     return stop.part(frac) if isinstance(stop, Limit) else stop
 
 
+def beginning_of(stop: ShouldStop, frac: float) -> ShouldStop:
+    """``frac`` (> 0) of what is left of ``stop`` now, where it is a limit; else all of it."""
+    if not isinstance(stop, Limit):
+        return stop
+    spent = stop.spent_frac(0.0)
+    whole = max(0.0, 1.0 - spent) * frac
+    if whole == 0.0:
+        return Limit(lambda _: 1.0)
+    return Limit(lambda evaluations: (stop.spent_frac(evaluations) - spent) / whole)
+
+
 def first_of(*stops: ShouldStop) -> Limit:
     """Stop as soon as any of ``stops`` says so; of several limits the one spent most counts."""
 

@@ -217,14 +217,14 @@ def make_plan(
     keeps = proven is None and bound_s is not None and bound_frac > 0.0
     search_ends = part_of(ends, 1.0 - bound_frac) if keeps else ends
     routes, sequence, evaluations = search.lists(proven, search_ends)
+    best = None if proven is None else evaluate(problem, proven.routes)[0]
     bound = None
     if proven is None and bound_s is not None:
         bound_ends = first_of(after_time(clock, bound_s), ends)
-        routes, sequence, bound = search.bounded(routes, sequence, bound_ends)
+        found, best, bound = search.bounded(routes, bound_ends)
+        if method == GuidedRule.name and found is not routes:
+            routes, sequence = found, _sequence(problem, team_at_start(problem), found)
     objective, completion_s = evaluate(problem, routes)
-    best = None if proven is None else evaluate(problem, proven.routes)[0]
-    if bound is not None and meets(bound, objective):
-        best, bound = objective, None
     plan = replace(
         search.described(mission.name, routes, sequence, completion_s),
         objective=objective,
@@ -264,18 +264,17 @@ class _PlanRequest:
         return optimum_before(self.problem, lambda: ends(0.0), threads=self.threads)
 
     def bounded(
-        self,
-        routes: Sequence[Sequence[int]],
-        sequence: tuple[int, ...] | None,
-        ends: ShouldStop,
-    ) -> tuple[Sequence[Sequence[int]], tuple[int, ...] | None, float]:
-        """The least bound on J found before `ends`, and the best lists known by then."""
+        self, routes: Sequence[Sequence[int]], ends: ShouldStop
+    ) -> tuple[Sequence[Sequence[int]], float | None, float | None]:
+        """The best lists of the same tasks known in the end, and the optimum or a bound on J."""
         found = upper_bound(
             self.problem, routes, ends, threads=self.threads, progress=self.bound_progress
         )
-        if self.method == GuidedRule.name and found.lists is not None:
-            routes, sequence = _better(self.problem, routes, sequence, found.lists)
-        return routes, sequence, found.objective
+        best = routes if found.lists is None else better_lists(self.problem, routes, found.lists)
+        objective = evaluate(self.problem, best)[0]
+        if meets(found.objective, objective):
+            return best, objective, None
+        return best, None, found.objective
 
     def described(
         self,
@@ -357,17 +356,12 @@ class _Reached:
         return self.reached
 
 
-def _better(
-    problem: Problem,
-    routes: Sequence[Sequence[int]],
-    sequence: tuple[int, ...] | None,
-    others: Sequence[Sequence[int]],
-) -> tuple[Sequence[Sequence[int]], tuple[int, ...] | None]:
-    """The lists with the larger J, of those that hold the same tasks, and the sequence to them."""
-    same = {task for route in routes for task in route} == {task for one in others for task in one}
-    if not same or evaluate(problem, others)[0] <= evaluate(problem, routes)[0]:
-        return routes, sequence
-    return others, _sequence(problem, team_at_start(problem), others)
+def better_lists(
+    problem: Problem, lists: Sequence[Sequence[int]], others: Sequence[Sequence[int]]
+) -> Sequence[Sequence[int]]:
+    """Those with the larger J; the first if the others do not hold the same tasks."""
+    same = sorted(task for one in lists for task in one) == sorted(t for one in others for t in one)
+    return others if same and evaluate(problem, others)[0] > evaluate(problem, lists)[0] else lists
 
 
 def _by_id(problem: Problem, routes: Sequence[Sequence[int]]) -> dict[UavId, tuple[TaskId, ...]]:

@@ -19,6 +19,7 @@ from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.rules import FIELD_INDEX_RULES, FIELD_RULES
 from swarm.kernels.field import run_rule
 from swarm.runtime.clock import Clock
+from swarm.runtime.errors import Fault, InputError
 
 BENCH_SHAPE = FieldShape(endurance_frac=0.4, bases=2, slots=0, zones=4, windows_frac=0.5)
 """As the shipped study field.toml, but without a limit of slots."""
@@ -36,6 +37,9 @@ def bench_problem(n_uav: int, n_task: int, seed: int) -> FieldProblem:
     drawn = random_field_mission(n_uav, n_task, seed, BENCH_SHAPE, f"{n_uav}x{n_task}-{seed}")
     mission = replace(drawn, uavs=tuple(replace(uav, success={}) for uav in drawn.uavs))
     horizon_s = _HORIZON_FRAC * field_span_s(mission)
+    if not horizon_s > 0.0:
+        problem = f"nobody can do anything in the mission of seed {seed}"
+        raise InputError(Fault("--sizes", f"{n_uav}x{n_task}", problem, "ask for more tasks"))
     return FieldProblem.from_mission(replace(mission, horizon_s=horizon_s))
 
 

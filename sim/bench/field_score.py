@@ -22,7 +22,7 @@ class FieldScore:
     left_out: int
     """Tasks without due_s that are not done."""
     broken: int
-    """Tasks on the lists that could not be done there; 0: the lists are flown as they are."""
+    """Tasks on the lists from the first on that could not be done there; 0: flown as they are."""
     end_s: FloatArray
     """(n_task,) when work ends [s]; NaN of what is not done."""
 

@@ -40,7 +40,8 @@ _MEASURED = (
     "Each method runs alone, in a process of its own, one after another, with the same limit in "
     "wall time; imports are not counted, and OR-Tools' building of its model comes on top of its "
     "limit. peak: memory of the whole process, interpreter and mission included. late: tasks "
-    "completed after D. guided and greedy use every core, the others one."
+    "completed after D. guided uses every core, and so does greedy of plain missions; the others "
+    "one."
 )
 
 _FIELD = (
@@ -48,9 +49,9 @@ _FIELD = (
     "size, p = 1 and survival 1; batteries, less their reserve, last for 40 % of the mean list, "
     "two bases without a limit of slots, swaps of 15 s, four zones, half of the tasks begin in a "
     "window; D = 1.2 × what the mission takes by value per time. Plans compare by (fewest tasks "
-    "left out, then J), all flown by the evaluator of plans; broken: tasks that could not be done "
-    "where their list has them. Then base visits are chosen anew, the best for the list's order, "
-    "and only tasks for which there are none are dropped."
+    "left out, then J), all flown by the evaluator of plans; broken: tasks of lists that cannot be "
+    "flown, from the first on that cannot be done. Then base visits are chosen anew, the best for "
+    "the list's order, and only tasks for which there are none are dropped."
 )
 
 _SCALING_TITLE = "Time and memory by size"

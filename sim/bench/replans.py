@@ -76,13 +76,13 @@ class ReplanTime:
 
     @property
     def gain_frac(self) -> float:
-        """What the new plan gains."""
-        return self.replanned / self.going_on - 1.0
+        """What the new plan gains; 0 where nothing is left to win."""
+        return self.replanned / self.going_on - 1.0 if self.going_on else 0.0
 
     @property
     def of_unhurried(self) -> float:
-        """What it reaches of a long search."""
-        return self.replanned / self.unhurried
+        """What it reaches of a long search, which has all processors."""
+        return self.replanned / self.unhurried if self.unhurried else 1.0
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,7 +65,7 @@ Gains best_insertions(const BoundField& field, const BoundFieldTeam& given, int 
             for (int task = 0; task < problem.n_task; ++task) {
                 if (!wanted.data()[task]) continue;
                 bool ignored = false;
-                const Insertion best = solver.best_place(list, stays, task, ignored);
+                const ItemInsertion best = solver.best_place(list, stays, task, ignored);
                 gains[task] = best.gain;
                 places[task] = static_cast<std::int32_t>(best.place);
             }

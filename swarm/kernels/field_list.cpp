@@ -228,15 +228,15 @@ bool ListSolver::can_do(const FieldList& list, const Stays& stays, int task) {
 // A place is valued in three steps, each ending it if the bound is not above the best gain so far:
 // by earliest times alone, with the labels after the new task, and with those after each task that
 // follows.
-Insertion ListSolver::best_place(FieldList& list, const Stays& stays, int task,
+ItemInsertion ListSolver::best_place(FieldList& list, const Stays& stays, int task,
                                  bool& meets_slots) {
     bounds_.clear();
     bound_places(list, task, bounds_);
     std::make_heap(bounds_.begin(), bounds_.end());
-    Insertion best;
+    ItemInsertion best;
     while (!bounds_.empty() && bounds_.front().gain > best.gain) {
         std::pop_heap(bounds_.begin(), bounds_.end());
-        Insertion next = bounds_.back();
+        ItemInsertion next = bounds_.back();
         bounds_.pop_back();
         next.gain = gain_at(list, stays, next.place, task, best.gain, meets_slots);
         if (next.gain > best.gain) best = next;
@@ -244,7 +244,7 @@ Insertion ListSolver::best_place(FieldList& list, const Stays& stays, int task,
     return best;
 }
 
-void ListSolver::bound_places(FieldList& list, int task, std::vector<Insertion>& bounds) {
+void ListSolver::bound_places(FieldList& list, int task, std::vector<ItemInsertion>& bounds) {
     if (list.value == -kInfinity) return;
     learn(list);
     for (std::size_t place = 0; place <= list.order.size(); ++place)

@@ -92,13 +92,13 @@ struct FieldList {
 };
 
 // What a task gains at a place of a list.
-struct Insertion {
+struct ItemInsertion {
     double gain = -std::numeric_limits<double>::infinity();
     std::size_t place = 0;
     int uav = -1;
 
     // The smaller index first of what gains as much.
-    bool operator<(const Insertion& other) const {
+    bool operator<(const ItemInsertion& other) const {
         if (gain != other.gain) return gain < other.gain;
         return uav != other.uav ? uav > other.uav : place > other.place;
     }
@@ -124,10 +124,10 @@ class ListSolver {
     bool can_do(const FieldList& list, const Stays& stays, int task);
 
     // Where `task` gains most.
-    Insertion best_place(FieldList& list, const Stays& stays, int task, bool& meets_slots);
+    ItemInsertion best_place(FieldList& list, const Stays& stays, int task, bool& meets_slots);
 
     // Append what `task` gains at most at every place of the list.
-    void bound_places(FieldList& list, int task, std::vector<Insertion>& bounds);
+    void bound_places(FieldList& list, int task, std::vector<ItemInsertion>& bounds);
 
     // What `task` gains at that place of a list whose places were bounded, if that is more than
     // `least`; else -infinity.
@@ -170,7 +170,7 @@ class ListSolver {
     std::vector<Progress> ready_;  // after a swap at each base
     std::vector<int> before_;      // the base before that one; -1: none, -2: can't be reached
     std::vector<ListLabel> here_, next_;
-    std::vector<Insertion> bounds_;
+    std::vector<ItemInsertion> bounds_;
     Random* random_ = nullptr;
     double overlooks_ = 0.0;
     FieldList before_refresh_;

@@ -308,10 +308,10 @@ FieldLane::Known& FieldLane::known_now(int uav, int task) {
 }
 
 // Where a list would take a task best.
-Insertion FieldLane::best_place(int uav, int task) {
+ItemInsertion FieldLane::best_place(int uav, int task) {
     Known& here = known_now(uav, task);
     if (!here.exact) {
-        const Insertion best = solver_.best_place(lists_[uav], stays_, task, here.meets_slots);
+        const ItemInsertion best = solver_.best_place(lists_[uav], stays_, task, here.meets_slots);
         here.most = best.gain;
         here.place = best.place;
         here.exact = true;
@@ -321,9 +321,9 @@ Insertion FieldLane::best_place(int uav, int task) {
 
 // Where the lists asked would take a task best, if that gains more than `least`: the place with the
 // highest bound of all is valued first.
-Insertion FieldLane::best_place(int task, double least) {
-    Insertion best{least};
-    const auto offer = [&](const Insertion& one) {
+ItemInsertion FieldLane::best_place(int task, double least) {
+    ItemInsertion best{least};
+    const auto offer = [&](const ItemInsertion& one) {
         if (one.gain > least && best < one) best = one;
     };
     std::size_t doubtful = 0;
@@ -354,7 +354,7 @@ Insertion FieldLane::best_place(int task, double least) {
     std::make_heap(bounds_.begin(), bounds_.end());
     while (!bounds_.empty() && bounds_.front().gain > best.gain) {
         std::pop_heap(bounds_.begin(), bounds_.end());
-        Insertion next = bounds_.back();
+        ItemInsertion next = bounds_.back();
         bounds_.pop_back();
         Known& here = known(next.uav, task);
         next.gain = solver_.gain_at(lists_[next.uav], stays_, next.place, task, best.gain,
@@ -384,7 +384,7 @@ bool FieldLane::put_back(int task) {
     asked_.clear();
     for (const int uav : able_[task])
         if (random_.uniform() >= kListBlink) asked_.push_back(uav);
-    const Insertion best = best_place(task, problem_.required[task] ? -kInfinity : 0.0);
+    const ItemInsertion best = best_place(task, problem_.required[task] ? -kInfinity : 0.0);
     if (best.uav < 0) return false;
     insert(best.uav, best.place, task);
     return true;

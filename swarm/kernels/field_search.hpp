@@ -73,8 +73,8 @@ class FieldLane {
     void put_back_by_regret();
     Known& known(int uav, int task);
     Known& known_now(int uav, int task);
-    Insertion best_place(int uav, int task);
-    Insertion best_place(int task, double least);
+    ItemInsertion best_place(int uav, int task);
+    ItemInsertion best_place(int task, double least);
     void insert(int uav, std::size_t place, int task);
     void remove(int uav, std::size_t from, std::size_t count);
     void settle(int uav, std::size_t kept, double overlooks = 0.0);
@@ -112,7 +112,7 @@ class FieldLane {
     std::size_t placed_ = 0;              // tasks that had their first turn
     std::vector<Known> known_;            // (n_uav, n_task)
     std::vector<int> asked_;
-    std::vector<Insertion> bounds_;  // a heap
+    std::vector<ItemInsertion> bounds_;  // a heap
     std::vector<Times> times_;
     std::vector<Stay> own_stays_;
     double scale_ = 0.0;

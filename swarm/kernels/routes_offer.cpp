@@ -1,7 +1,6 @@
 #include "routes_offer.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 namespace peckorder {
 

@@ -1,5 +1,7 @@
 #include "routes_pricing.hpp"
 
+#include <atomic>
+
 #include "parallel.hpp"
 #include "routes_heads.hpp"
 #include "routes_offer.hpp"
@@ -62,8 +64,13 @@ std::vector<WorthyLists> worthy_lists(const Problem& problem, const Start& start
                                       const ListPricing& pricing,
                                       const std::vector<double>& most, Watch& watch) {
   std::vector<WorthyLists> found(start.active.size());
+  std::atomic<bool> missing{false};  // then all is in vain
   for_active(start, pricing.threads, watch, [&](int uav) {
-    found[uav] = worthy_list(problem, start, uav, pricing, most[uav] - pricing.slack, watch);
+    if (!missing) found[uav] = worthy_list(problem, start, uav, pricing, most[uav] - pricing.slack, watch);
+    if (missing || !found[uav].all) {
+      found[uav] = {false, {}, {}};
+      missing = true;
+    }
   });
   return found;
 }

@@ -202,7 +202,7 @@ Insertion best_insertion(const Solution& solution, int task, Skip&& skip) {
   if (!all) {
     const double* here_m = problem.place_m(task);
     const std::int32_t* near = problem.near(task);
-    const int most = 
+    const int most =
         std::min(problem.n_task() < kManyTasks ? kNear : kNearOfMany, problem.n_near());
     const double farthest_m = Problem::straight_m(here_m, problem.place_m(near[most - 1]));
     for (int k = 0; k < most; ++k) {

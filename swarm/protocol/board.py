@@ -33,6 +33,8 @@ from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase
 
 _UNLIMITED = FIELD_DEFAULTS[TaskEntry]
 """Of a task of which a plain problem tells all."""
+_LOOKED_AT_FIRST = 50
+"""Open tasks, before all others are looked at together."""
 
 
 def claim_strength(uav: str, claim: Claim) -> tuple[bool, float, int, str]:
@@ -82,10 +84,11 @@ def anything_doable(board: TaskBoard, present: Collection[str]) -> bool:
         if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
     ]
     # In board order, as the problem's tasks are; mostly one of the first that are open will do.
-    return any(
-        state is TaskState.OPEN and bool(problem.capable[able, column].any())
-        for column, state in enumerate(board.states.values())
-    )
+    open_ = [
+        column for column, state in enumerate(board.states.values()) if state is TaskState.OPEN
+    ]
+    first, rest = open_[:_LOOKED_AT_FIRST], open_[_LOOKED_AT_FIRST:]
+    return any(some and bool(problem.capable[:, some][able].any()) for some in (first, rest))
 
 
 class TaskBoard:

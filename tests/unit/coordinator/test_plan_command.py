@@ -174,6 +174,9 @@ def test_large_mission_is_bounded_unless_told_otherwise(
 ) -> None:
     assert plan("valley-survey", "--method", "guided", "--json") == 0
     bounded = json.loads(capsys.readouterr().out)
+    assert plan("valley-survey", "--no-bound", "--bound-s", "5") == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "--bound-s: 5: there is no bound with --no-bound; give one of the two" in line
     assert plan("valley-survey", "--method", "guided", "--no-bound", "--json") == 0
     unbounded = json.loads(capsys.readouterr().out)
 

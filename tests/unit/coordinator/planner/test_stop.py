@@ -2,7 +2,15 @@ from __future__ import annotations
 
 import pytest
 
-from coordinator.planner.options import after_evaluations, after_time, first_of, never, part_of
+from coordinator.planner.options import (
+    Limit,
+    after_evaluations,
+    after_time,
+    beginning_of,
+    first_of,
+    never,
+    part_of,
+)
 
 
 class HandClock:
@@ -56,6 +64,21 @@ def test_a_limit_in_time_may_have_begun_earlier() -> None:
 
     assert after_time(clock, 2.0, begin_s=98.0)(0)
     assert after_time(clock, 4.0, begin_s=98.0).spent_frac(0) == 0.5
+
+
+def test_the_beginning_of_a_limit_counts_from_where_it_is_asked_for() -> None:
+    spent = 0.75
+    limit = Limit(lambda _: spent)
+    half = beginning_of(limit, 0.5)
+
+    assert not half(0.0)
+    spent = 0.87
+    assert not half(0.0)
+    spent = 0.875
+    assert half(0.0)
+    spent = 1.0
+    assert beginning_of(limit, 0.5)(0.0)  # nothing is left
+    assert beginning_of(never, 0.5) is never
 
 
 def test_a_part_of_a_limit_ends_earlier() -> None:
