@@ -104,7 +104,8 @@ def random_field_mission(uavs: int, tasks: int, seed: int, shape: FieldShape, na
     mission = _with_lines(_rng(seed, "lines"), mission, planner, shape.lines_frac)
     if mission.constraints:
         mission = _with_times(seed, mission, shape)
-        mission = replace(mission, horizon_s=_HORIZON_FRAC * field_span_s(mission))
+        if (span_s := field_span_s(mission)) > 0.0:  # somebody can do something
+            mission = replace(mission, horizon_s=_HORIZON_FRAC * span_s)
     return mission
 
 

@@ -285,6 +285,29 @@ def test_nobody_is_told_of_a_plan_that_was_given_up_and_closing_waits_for_its_en
     assert (plans.ended, plans.told) == ([1, 2], [])
 
 
+def test_a_fault_in_a_plan_that_nobody_wants_any_more_is_not_heard() -> None:
+    plans = PlansInTurn()
+
+    def fails_first(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
+        plan = plans.plan(wanted, unwanted)
+        if wanted.request == 1:
+            raise OwnError
+        return plan
+
+    async def scenario() -> None:
+        plans.planner = BackgroundPlanner(fails_first, plans.told.append, plans.faults.append)
+        plans.begin(1)
+        await until(lambda: plans.begun == [1], "the first plan")
+        plans.begin(2)
+        await until(lambda: plans.begun == [1, 2], "the newest plan")
+        plans.may_end.set()
+        await until(lambda: plans.told_of == [2], "what comes of it")
+        await plans.planner.close()
+
+    play(scenario)
+    assert plans.faults == []
+
+
 def test_a_running_mission_is_planned_anew_beside_the_loop() -> None:
     tasks = [task("t0", 1.0), task("t1", 2.0, appears_s=4.0)]
 

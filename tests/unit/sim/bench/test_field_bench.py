@@ -16,6 +16,7 @@ from sim.bench.solvers import MissionSource, PlanningJob, PlanningRun, run_in_su
 from swarm.allocation.field import FieldState
 from swarm.kernels.field import fly_lists
 from swarm.runtime.clock import SystemClock
+from swarm.runtime.errors import InputError
 
 SMALL = ("4×16", MissionSource(n_uav=4, n_task=16, field=True))
 
@@ -27,6 +28,11 @@ def in_process(job: PlanningJob) -> PlanningRun:
 @pytest.fixture(scope="module")
 def bench() -> PlanBench:
     return measure_plans([SMALL], list(FIELD_METHODS), [0.3], [0, 1], run=in_process)
+
+
+def test_a_mission_in_which_nobody_can_do_anything_is_refused() -> None:
+    with pytest.raises(InputError, match="--sizes: 2x2: nobody can do anything in the mission of"):
+        bench_problem(2, 2, 0)
 
 
 def test_every_method_makes_lists_that_our_evaluator_flies(bench: PlanBench) -> None:

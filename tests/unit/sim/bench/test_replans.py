@@ -30,6 +30,14 @@ def test_what_happens_is_told_as_registers_would(midway: bool) -> None:
     assert (situation.now_s > 0.0) is midway
 
 
+def test_a_mission_with_nothing_left_gains_nothing() -> None:
+    found = measure_replans([(1, 2)], [0], SystemClock(), unhurried_s=0.05)
+
+    midway = found.times[1]
+    assert midway.n_open == midway.going_on == 0
+    assert (midway.gain_frac, midway.of_unhurried) == (0.0, 1.0)
+
+
 def test_replans_are_measured() -> None:
     found = measure_replans([(5, 70)], [0, 1], SystemClock(), unhurried_s=0.2)
 
