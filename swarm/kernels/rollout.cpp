@@ -33,7 +33,7 @@ constexpr int kFewTasks = 150;
 constexpr int kNearToPlace = 10;
 // UAVs whose lists are reconsidered, and tasks on these: the list that goes beyond is the last.
 constexpr std::size_t kMostSearched = 12;
-constexpr std::size_t kMostTasks = 80;
+constexpr std::size_t kMostTasks = 56;
 // Of a watch, for local search before the search and again after it.
 constexpr std::int64_t kMostSteps = 40'000;
 
