@@ -32,7 +32,13 @@ from coordinator.planner.options import ShouldStop, beginning_of, never
 from swarm.allocation.problem import FloatArray, Problem
 from swarm.allocation.rules import team_at_start
 from swarm.kernels.routes import TeamArrays
-from swarm.kernels.routes_pricing import ListBundle, PricedLists, price_lists, worthy_lists
+from swarm.kernels.routes_pricing import (
+    ListBundle,
+    PricedLists,
+    WorthyLists,
+    price_lists,
+    worthy_lists,
+)
 
 Pricing = Callable[[FloatArray], PricedLists | None]
 """The best lists at given prices, bounded from above; None where it was told to stop."""
@@ -59,7 +65,7 @@ _ROUNDING = 2e-10
 _MET = 1e-9
 _CLOSING_HEADS = 100_000
 """Beginnings of lists looked at, per UAV, when those that might be part of an optimum are named."""
-_FIRST_SLACK_FRAC, _WIDER = 2e-4, 3.0
+_FIRST_SLACK_FRAC, _WIDER = 2e-4, 2.0
 _MOST_WORTHY = 50_000
 """Lists that are chosen from."""
 
@@ -163,7 +169,16 @@ def upper_bound(
     )
     better: tuple[tuple[int, ...], ...] | None = None
     if relaxed.settled and team.problem.certain and relaxed.bound > known.worth:
-        closed, better = _closed(team, relaxed, known.worth, stops, threads)
+        worthy = partial(
+            worthy_lists,
+            team,
+            relaxed.price,
+            relaxed.earned,
+            heads=_CLOSING_HEADS,
+            threads=threads,
+            should_stop=stops,
+        )
+        closed, better = closed_bound(worthy, relaxed, known.worth, stops)
         note(closed)
     return UpperBound(lowest, relaxed.rounds, better)
 
@@ -283,35 +298,33 @@ def _learn(bundle: ListBundle, found: PricedLists) -> None:
     bundle.add(some, found.worth[some], [found.lists[uav] for uav in some])
 
 
-def _closed(
-    team: TeamArrays,
+def closed_bound(
+    worthy: Callable[[float], WorthyLists | None],
     relaxed: Relaxed,
     known: float,
     stops: Callable[[], bool],
-    threads: int | None,
 ) -> tuple[float, tuple[tuple[int, ...], ...] | None]:
-    """A bound over disjoint lists, and lists that reach it where they were not known.
+    """A bound over disjoint lists, and the best lists met where they are better than known ones.
 
     Step by step farther below the bound of the prices: what is worth more than bound - slack is
     made of lists that lose no more than the slack. Where these are too many it ends.
+
+    Args:
+        worthy: all lists that lose no more than so much [value·s]; None where it gave up.
+        relaxed: the bound of the prices.
+        known: J of lists that are known [value·s].
+        stops: asked every few milliseconds whether to give up.
     """
-    n_uav = team.problem.n_uav
+    n_uav = len(relaxed.earned)
+    better: tuple[tuple[int, ...], ...] | None = None
     lowest, slack = relaxed.bound, _FIRST_SLACK_FRAC * abs(relaxed.bound)
     while True:
         slack = min(slack, relaxed.bound - known)
-        worthy = worthy_lists(
-            team,
-            relaxed.price,
-            relaxed.earned,
-            slack,
-            heads=_CLOSING_HEADS,
-            threads=threads,
-            should_stop=stops,
-        )
-        if worthy is None or len(worthy.lists) > _MOST_WORTHY:
-            return lowest, None
+        lists = worthy(slack)
+        if lists is None or len(lists.lists) > _MOST_WORTHY:
+            break
         found = best_disjoint(
-            worthy,
+            lists,
             relaxed.price,
             n_uav,
             known=max(known, relaxed.bound - slack),
@@ -319,15 +332,14 @@ def _closed(
             should_stop=stops,
         )
         lowest = min(lowest, found.bound)
-        if found.chosen is not None or slack >= relaxed.bound - known or stops():
+        if found.worth > known:
+            known = found.worth
+            chosen = {int(lists.uav[k]): tuple(lists.lists[k]) for k in found.chosen}
+            better = tuple(chosen.get(uav, ()) for uav in range(n_uav))
+        if known >= relaxed.bound - slack or stops():
             break
         slack *= _WIDER
-    if found.chosen is None:
-        return lowest, None
-    better: list[tuple[int, ...]] = [()] * n_uav
-    for k in found.chosen:
-        better[int(worthy.uav[k])] = tuple(worthy.lists[k])
-    return lowest, tuple(better)
+    return lowest, better
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -35,8 +35,10 @@ class Disjoint:
 
     bound: float
     """No disjoint lists among those given, nor what was known, are worth more [value·s]."""
-    chosen: tuple[int, ...] | None
-    """Indices of lists that are worth more than what was known, if there are any."""
+    worth: float
+    """Of the best disjoint lists that were met, and maybe less than what was known [value·s]."""
+    chosen: tuple[int, ...]
+    """Their indices."""
 
 
 def best_disjoint(
@@ -54,7 +56,7 @@ def best_disjoint(
         lists: to choose from.
         price: (n_task,) at which to begin [value·s].
         n_uav: how many UAVs there are.
-        known: worth of what is known; only what is worth more is looked for.
+        known: worth of what is known; what is worth more is looked for.
         bound: on the sum [value·s].
         should_stop: asked every few milliseconds; then the bound is that of what is left.
     """
@@ -72,7 +74,7 @@ class _Branches:
     ) -> None:
         self._lists, self._n_uav, self._n_task = lists, n_uav, len(price)
         self._should_stop = should_stop
-        self._best, self._chosen = known, None
+        self._best, self._met, self._chosen = known, 0.0, ()
         self._sizes = np.array([len(one) for one in lists.lists], dtype=np.int64)
         self._starts = np.concatenate([[0], np.cumsum(self._sizes)])
         self._flat = np.array([task for one in lists.lists for task in one], dtype=np.int64)
@@ -81,7 +83,7 @@ class _Branches:
         self._open: list[tuple[float, int, IntArray, FloatArray]] = []
         self._made = self._held = 0
 
-    _chosen: tuple[int, ...] | None
+    _chosen: tuple[int, ...]
 
     def run(self, bound: float) -> Disjoint:
         # In the best choice none is worth less than nothing: without it the others are as good.
@@ -97,8 +99,8 @@ class _Branches:
                 or self._should_stop()
                 or not self._branch(-minus, left, price)
             ):
-                return Disjoint(max(-minus, self._enough()), self._chosen)
-        return Disjoint(self._enough(), self._chosen)
+                return Disjoint(max(-minus, self._enough()), self._met, self._chosen)
+        return Disjoint(self._enough(), self._met, self._chosen)
 
     def _enough(self) -> float:
         return self._best + _TOLERANCE * abs(self._best)
@@ -115,7 +117,6 @@ class _Branches:
             return False
         if bound <= self._enough():
             return True
-        self._try(left, share)
         rows = np.repeat(np.arange(len(left)), self._sizes[left])
         tasks = self._flat[_ranges(self._starts[left], self._sizes[left])]
         uavs = self._lists.uav[left]
@@ -160,6 +161,7 @@ class _Branches:
             step *= 2.0
         share = bundle.shares()
         earned = self._earned(left, price)
+        self._try(left, np.lexsort((-earned, -share)))
         most = np.zeros(self._n_uav)
         np.maximum.at(most, lists.uav[left], earned)
         at_prices = float(price.sum() + most.sum())
@@ -173,12 +175,12 @@ class _Branches:
         earned: FloatArray = self._lists.worth[left] - paid
         return earned
 
-    def _try(self, left: IntArray, share: FloatArray) -> None:
-        """Take lists by their shares, as long as they are disjoint."""
+    def _try(self, left: IntArray, order: IntArray) -> None:
+        """Take lists in that order, as long as they are disjoint."""
         taken = np.zeros(self._n_task, dtype=np.bool_)
         busy = np.zeros(self._n_uav, dtype=np.bool_)
         chosen = []
-        for k in np.argsort(-share, kind="stable").tolist():
+        for k in order.tolist():
             tasks = self._lists.lists[left[k]]
             uav = self._lists.uav[left[k]]
             if not busy[uav] and not taken[tasks].any():
@@ -188,8 +190,9 @@ class _Branches:
 
     def _take(self, disjoint: IntArray) -> None:
         worth = float(self._lists.worth[disjoint].sum())
-        if worth > self._best:
-            self._best, self._chosen = worth, tuple(disjoint.tolist())
+        self._best = max(self._best, worth)
+        if worth > self._met:
+            self._met, self._chosen = worth, tuple(disjoint.tolist())
 
 
 def _ranges(starts: IntArray, sizes: IntArray) -> npt.NDArray[np.int64]:

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <map>
 #include <numeric>
 #include <queue>
 #include <utility>
@@ -298,6 +299,64 @@ class RealLists {
   int best_ = -1;       // its last task
 };
 
+// All real lists that earn at least `floor`, depth first; gives up after `most` beginnings.
+class WorthyRealLists {
+ public:
+  WorthyRealLists(const TimedOffer& offer, const RelaxedLists& relaxed, double floor, long most,
+                  Watch& watch)
+      : offer_(offer), relaxed_(relaxed), floor_(floor), left_(most), watch_(watch),
+        on_it_(offer.n(), 0) {}
+
+  WorthyLists run() {
+    for (int l = 0; l < offer_.n(); ++l) reach(l, offer_.first_s[l], 1.0, 0.0, 0.0);
+    WorthyLists found;
+    found.all = left_ > 0 && !watch_.stopped();
+    for (const auto& [tasks, list] : best_) {
+      found.lists.push_back(list.second);
+      found.worth.push_back(list.first);
+    }
+    return found;
+  }
+
+ private:
+  // The list so far, with `l` next, arrived at at that time; `earned` and `worth` without `l`.
+  void reach(int l, double time_s, double survived, double earned, double worth) {
+    time_s = std::max(time_s, offer_.earliest_s[l]);
+    if (left_ <= 0 || time_s > offer_.latest_s[l] || time_s >= offer_.left_s) return;
+    earned += offer_.gain(l, time_s, survived);
+    const int bucket = relaxed_.bucket(time_s);
+    const bool over = offer_.ends(l) || bucket > relaxed_.last();
+    if (earned + (over ? 0.0 : relaxed_.rest(l, bucket)) < floor_) return;
+    if (watch_.stops_after(offer_.n())) left_ = 0;
+    --left_;
+    worth += survived * offer_.weight[l] * (offer_.left_s - time_s);
+    survived *= offer_.survival[l];
+    list_.push_back(offer_.tasks[l]);
+    on_it_[l] = 1;
+    if (earned >= floor_) keep(worth);
+    for (int next = 0; next < offer_.n() && !over; ++next)
+      if (!on_it_[next]) reach(next, time_s + offer_.leg(l, next), survived, earned, worth);
+    on_it_[l] = 0;
+    list_.pop_back();
+  }
+
+  void keep(double worth) {
+    Route tasks = list_;
+    std::sort(tasks.begin(), tasks.end());
+    auto& best = best_[tasks];
+    if (best.second.empty() || worth > best.first) best = {worth, list_};
+  }
+
+  const TimedOffer& offer_;
+  const RelaxedLists& relaxed_;
+  double floor_;
+  long left_;
+  Watch& watch_;
+  std::vector<char> on_it_;
+  Route list_;
+  std::map<Route, std::pair<double, Route>> best_;  // by their tasks in order
+};
+
 PricedList relaxed_list(const Problem& problem, const Start& start, int uav,
                         const RelaxedPricing& pricing, Watch& watch) {
   PricedList found;
@@ -313,6 +372,14 @@ PricedList relaxed_list(const Problem& problem, const Start& start, int uav,
   return found;
 }
 
+WorthyLists worthy_timed_list(const Problem& problem, const Start& start, int uav,
+                              const RelaxedPricing& pricing, double floor, Watch& watch) {
+  const TimedOffer offer(problem, start, uav, pricing);
+  const RelaxedLists relaxed(offer, pricing.bucket_s, watch);
+  if (relaxed.last() < 0 || watch.stopped()) return {};
+  return WorthyRealLists(offer, relaxed, floor, pricing.expansions, watch).run();
+}
+
 }  // namespace
 
 std::vector<PricedList> relaxed_lists(const Problem& problem, const Start& start,
@@ -322,6 +389,21 @@ std::vector<PricedList> relaxed_lists(const Problem& problem, const Start& start
     return [&](std::size_t uav) {
       if (start.active[uav] && !watch.stopped())
         found[uav] = relaxed_list(problem, start, static_cast<int>(uav), pricing, watch);
+    };
+  });
+  return found;
+}
+
+std::vector<WorthyLists> worthy_timed_lists(const Problem& problem, const Start& start,
+                                            const RelaxedPricing& pricing,
+                                            const std::vector<double>& most, double slack,
+                                            Watch& watch) {
+  std::vector<WorthyLists> found(start.active.size());
+  parallel_for(found.size(), pricing.threads, 1, [&] {
+    return [&](std::size_t uav) {
+      if (start.active[uav] && !watch.stopped())
+        found[uav] = worthy_timed_list(problem, start, static_cast<int>(uav), pricing,
+                                       most[uav] - slack, watch);
     };
   });
   return found;

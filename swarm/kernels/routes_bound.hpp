@@ -44,4 +44,12 @@ struct RelaxedPricing {
 std::vector<PricedList> relaxed_lists(const Problem& problem, const Start& start,
                                       const RelaxedPricing& pricing, Watch& watch);
 
+// Per UAV all real lists whose last task gains something and that earn at least `most` of it less the
+// slack, where no list earns more than `most`; of those with the same tasks the best. `expansions`
+// beginnings are looked at, at most, per UAV.
+std::vector<WorthyLists> worthy_timed_lists(const Problem& problem, const Start& start,
+                                            const RelaxedPricing& pricing,
+                                            const std::vector<double>& most, double slack,
+                                            Watch& watch);
+
 }  // namespace peckorder

@@ -6,7 +6,7 @@ that of the start, and tasks allowed more than once.
 From that relaxation a search among real lists may go on, with exact times, S as eq. 1 has it, and
 every task once: best-first, by what a list is worth so far and what the relaxation can still add.
 Where it is cut short, the most that is left counts, so what is found is never below the best
-list's worth.
+list's worth. `worthy_timed_lists` names all real ones that are good enough.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from swarm.kernels import _kernels
 from swarm.kernels.routes import FloatArray, TeamArrays, lists_of
-from swarm.kernels.routes_pricing import PricedLists
+from swarm.kernels.routes_pricing import PricedLists, WorthyLists
 
 MOST_BUCKETS = 100_000
 
@@ -91,6 +91,89 @@ def relaxed_lists(
     Raises:
         ValueError: names the argument that is wrong.
     """
+    prices, count = _checked(team, price, bucket_s, timetable, threads)
+    if expansions < 0:
+        raise ValueError(f"expansions must be >= 0, not {expansions}")
+    done, bound, worth, lists = _kernels.relaxed_lists(
+        team.problem,
+        *team.arguments(),
+        np.asarray(team.open),
+        prices,
+        float(bucket_s),
+        None if timetable is None else timetable.kernel,
+        expansions,
+        count,
+        should_stop,
+    )
+    return PricedLists(bound, worth, lists_of(*lists)) if done else None
+
+
+def worthy_timed_lists(
+    team: TeamArrays,
+    price: FloatArray,
+    most: FloatArray,
+    slack: float,
+    bucket_s: float,
+    *,
+    heads: int,
+    timetable: Timetable | None = None,
+    threads: int | None = None,
+    should_stop: Callable[[], bool] | None = None,
+) -> WorthyLists | None:
+    """All real lists of active UAVs that earn nearly as much as the best, the empty ones apart.
+
+    S is as eq. 1 has it. Lists whose last task gains nothing are left out, and of those with the
+    same tasks all but the best.
+
+    Args:
+        team: mission and state.
+        price: (n_task,) to pay for each visit [value·s]; >= 0.
+        most: (n_uav,) no list earns more [value·s].
+        slack: they earn less than that by no more [value·s]; >= 0.
+        bucket_s: width of a bucket of the relaxation that guides it [s]; > 0.
+        heads: beginnings of lists that are looked at, at most, per UAV.
+        timetable: of flights, in place of the mission's places, speeds and service times.
+        threads: at most this many; does not change the result.
+        should_stop: asked every few milliseconds whether to give up.
+
+    Returns:
+        None where there would be too many, or it was told to give up.
+
+    Raises:
+        ValueError: names the argument that is wrong.
+    """
+    prices, count = _checked(team, price, bucket_s, timetable, threads)
+    bests = np.array(most, dtype=np.float64, order="C")
+    if bests.shape != (team.problem.n_uav,) or not np.isfinite(bests).all():
+        raise ValueError(f"most must be {team.problem.n_uav} finite numbers")
+    if not slack >= 0.0:
+        raise ValueError(f"slack must be >= 0, not {slack}")
+    if heads < 1:
+        raise ValueError(f"heads must be >= 1, not {heads}")
+    complete, uav, worth, lists = _kernels.worthy_timed_lists(
+        team.problem,
+        *team.arguments(),
+        np.asarray(team.open),
+        prices,
+        bests,
+        float(slack),
+        float(bucket_s),
+        None if timetable is None else timetable.kernel,
+        heads,
+        count,
+        should_stop,
+    )
+    return WorthyLists(uav, worth, lists_of(*lists)) if complete else None
+
+
+def _checked(
+    team: TeamArrays,
+    price: FloatArray,
+    bucket_s: float,
+    timetable: Timetable | None,
+    threads: int | None,
+) -> tuple[FloatArray, int]:
+    """Prices and a number of threads; names the argument that is wrong."""
     prices = np.array(price, dtype=np.float64, order="C")
     if prices.shape != (team.problem.n_task,):
         raise ValueError(f"price must have shape {(team.problem.n_task,)}, not {prices.shape}")
@@ -102,22 +185,9 @@ def relaxed_lists(
         raise ValueError(f"bucket_s must be > 0 and make at most {MOST_BUCKETS} buckets")
     if timetable is not None and timetable.shape != (team.problem.n_uav, team.problem.n_task):
         raise ValueError(f"timetable must not be of shape {timetable.shape}")
-    if expansions < 0:
-        raise ValueError(f"expansions must be >= 0, not {expansions}")
     if threads is not None and threads < 1:
         raise ValueError(f"threads must be >= 1, not {threads}")
-    done, bound, worth, lists = _kernels.relaxed_lists(
-        team.problem,
-        *team.arguments(),
-        np.asarray(team.open),
-        prices,
-        float(bucket_s),
-        None if timetable is None else timetable.kernel,
-        expansions,
-        (os.cpu_count() or 1) if threads is None else threads,
-        should_stop,
-    )
-    return PricedLists(bound, worth, lists_of(*lists)) if done else None
+    return prices, (os.cpu_count() or 1) if threads is None else threads
 
 
 def _times(

@@ -2,16 +2,25 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <utility>
 
 namespace peckorder {
 
 namespace {
 constexpr int kMovesPerVisit = 4;  // of shares, before the next UAV's turn
+
+std::size_t hash_of(const Route& list, double worth) {
+  std::size_t hash = std::hash<double>{}(worth);
+  for (const int task : list)
+    hash ^= static_cast<std::size_t>(task) + 0x9e3779b9U + (hash << 6) + (hash >> 2);
+  return hash;
+}
 }  // namespace
 
 ListBundle::ListBundle(int n_uav, std::vector<double> prices)
     : known_(n_uav),
+      at_(n_uav),
       centre_(prices),
       prices_(std::move(prices)),
       visits_(centre_.size(), 0.0),
@@ -20,9 +29,13 @@ ListBundle::ListBundle(int n_uav, std::vector<double> prices)
 }
 
 void ListBundle::add(int uav, const Route& list, double worth) {
-  for (const Known& known : known_[uav])
-    if (known.worth == worth && known.tasks == list) return;
-  known_[uav].push_back({list, worth, 0.0});
+  std::vector<Known>& known = known_[uav];
+  const std::size_t hash = hash_of(list, worth);
+  const auto [first, last] = at_[uav].equal_range(hash);
+  for (auto at = first; at != last; ++at)
+    if (known[at->second].worth == worth && known[at->second].tasks == list) return;
+  at_[uav].emplace(hash, known.size());
+  known.push_back({list, worth, 0.0});
 }
 
 void ListBundle::set_price(int task, double step) {

@@ -12,6 +12,8 @@
 // optimisation: Platt 1998), UAV after UAV.
 #pragma once
 
+#include <cstddef>
+#include <unordered_map>
 #include <utility>
 #include <vector>
 
@@ -24,6 +26,7 @@ class ListBundle {
  public:
   ListBundle(int n_uav, std::vector<double> prices);
 
+  // Knows it already where it was added with the same worth.
   void add(int uav, const Route& list, double worth);
 
   // Moves shares until no UAV could gain more than `tolerance` by it, `sweeps` times at most.
@@ -50,6 +53,7 @@ class ListBundle {
   void set_price(int task, double step);
 
   std::vector<std::vector<Known>> known_;  // per UAV; the first is the empty list
+  std::vector<std::unordered_multimap<std::size_t, std::size_t>> at_;  // in known_, by a hash
   std::vector<double> centre_, prices_, visits_;
   std::vector<int> difference_;
 };

@@ -40,6 +40,22 @@ auto given(bool done, std::vector<PricedList>& found) {
   return std::make_tuple(done, give(std::move(bound)), give(std::move(worth)), to_arrays(lists));
 }
 
+// Whether none is missing, whose each is, worths before paying, lists.
+auto given(bool all, std::vector<WorthyLists>& found) {
+  std::vector<std::int64_t> uavs;
+  std::vector<double> worth;
+  Routes lists;
+  for (std::size_t uav = 0; uav < found.size(); ++uav) {
+    all = all && found[uav].all;
+    for (std::size_t k = 0; k < found[uav].lists.size(); ++k) {
+      uavs.push_back(static_cast<std::int64_t>(uav));
+      worth.push_back(found[uav].worth[k]);
+      lists.push_back(std::move(found[uav].lists[k]));
+    }
+  }
+  return std::make_tuple(all, give(std::move(uavs)), give(std::move(worth)), to_arrays(lists));
+}
+
 }  // namespace
 
 void bind_routes_pricing(nb::module_& module) {
@@ -78,19 +94,7 @@ void bind_routes_pricing(nb::module_& module) {
                                bests, watch);
           all = !watch.stopped();
         });
-        std::vector<std::int64_t> uavs;
-        std::vector<double> worth;
-        Routes lists;
-        for (std::size_t uav = 0; uav < found.size(); ++uav) {
-          all = all && found[uav].all;
-          for (std::size_t k = 0; k < found[uav].lists.size(); ++k) {
-            uavs.push_back(static_cast<std::int64_t>(uav));
-            worth.push_back(found[uav].worth[k]);
-            lists.push_back(std::move(found[uav].lists[k]));
-          }
-        }
-        return std::make_tuple(all, give(std::move(uavs)), give(std::move(worth)),
-                               to_arrays(lists));
+        return given(all, found);
       },
       nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("most"), nb::arg("slack"),
@@ -127,6 +131,30 @@ void bind_routes_pricing(nb::module_& module) {
       nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
       nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("bucket_s"),
       nb::arg("timetable").none(), nb::arg("expansions"), nb::arg("threads"),
+      nb::arg("should_stop") = nb::none());
+
+  module.def(
+      "worthy_timed_lists",
+      [](const Problem& problem, const Vector& free_s, const Matrix& place_m,
+         const Vector& survived, const Mask& active, const Mask& open, const Vector& prices,
+         const Vector& most, double slack, double bucket_s, const Timetable* timetable, long heads,
+         int threads, nb::handle should_stop) {
+        const StartArrays arrays{free_s, place_m, survived, active};
+        const std::vector<int> tasks = open_tasks(open);
+        const std::vector<double> price = copied(prices), bests = copied(most);
+        std::vector<WorthyLists> found;
+        bool all = true;
+        PythonWatch(should_stop).released([&](Watch& watch) {
+          found = worthy_timed_lists(problem, arrays.start(problem),
+                                     {tasks, price, bucket_s, timetable, heads, threads}, bests,
+                                     slack, watch);
+          all = !watch.stopped();
+        });
+        return given(all, found);
+      },
+      nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
+      nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("most"), nb::arg("slack"),
+      nb::arg("bucket_s"), nb::arg("timetable").none(), nb::arg("heads"), nb::arg("threads"),
       nb::arg("should_stop") = nb::none());
 
   nb::class_<ListBundle>(module, "ListBundle")

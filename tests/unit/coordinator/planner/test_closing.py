@@ -47,8 +47,8 @@ def test_nothing_disjoint_is_worth_more(seed: int, n_uav: int, n_task: int) -> N
 
     assert found.bound == pytest.approx(best, abs=1e-6)
     if best > 0.0:
-        assert found.chosen is not None
-        assert float(worth[list(found.chosen)].sum()) == pytest.approx(best, abs=1e-6)
+        assert found.worth == pytest.approx(best, abs=1e-6)
+    assert found.worth == pytest.approx(float(worth[list(found.chosen)].sum()))
 
 
 def test_a_list_that_is_worth_less_than_nothing_is_never_chosen() -> None:
@@ -66,3 +66,12 @@ def test_told_to_stop_the_bound_is_that_of_what_is_left() -> None:
     found = best_disjoint(lists, np.zeros(1), 2, known=5.0, bound=20.0, should_stop=lambda: True)
 
     assert found.bound >= 10.0
+
+
+def test_what_is_met_is_told_where_it_is_worth_less_than_what_is_known() -> None:
+    lists = WorthyLists(np.array([0, 1]), np.array([10.0, 9.0]), [[0], [0]])
+
+    found = best_disjoint(lists, np.zeros(1), 2, known=12.0, bound=20.0, should_stop=lambda: False)
+
+    assert (found.worth, found.chosen) == (10.0, (0,))
+    assert found.bound == pytest.approx(12.0)

@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from swarm.allocation import TeamState
 from swarm.allocation.rules import team_arrays, team_at_start
-from swarm.kernels.routes_bound import Timetable, relaxed_lists
+from swarm.kernels.routes_bound import Timetable, relaxed_lists, worthy_timed_lists
 from tests.support.problems import any_problem, table_1
 from tests.support.reference import list_worth, timed_list_worth
 
@@ -113,6 +113,65 @@ def test_timed_lists_are_bounded_and_searched_as_the_plain_definition_says(
         assert all(len(set(one)) == len(one) for one in found.lists)
 
 
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=st.integers(0, 2**32 - 1),
+    n_task=st.integers(1, 5),
+    bucket_s=st.floats(0.01, 5.0),
+    share=st.floats(0.0, 2.0),
+)
+def test_worthy_timed_lists_are_all_that_earn_nearly_as_much_as_the_best(
+    seed: int, n_task: int, bucket_s: float, share: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    problem = any_problem(seed, 2, n_task)
+    deadly = rng.random(problem.survival.shape) < 0.2
+    problem = replace(problem, survival=np.where(deadly, 0.0, problem.survival))
+    timetable = random_timetable(rng, 2, n_task)
+    price = rng.uniform(0.0, 10.0, n_task)
+    best: list[dict[tuple[int, ...], float]] = [{(): 0.0}, {(): 0.0}]
+    for uav in range(2):
+        for route in lists_of(np.flatnonzero(problem.capable[uav]).tolist()):
+            value = timed_list_worth(problem, timetable, uav, route)
+            before = timed_list_worth(problem, timetable, uav, route[:-1])
+            if route and value is not None and before is not None and value > before:
+                key = tuple(sorted(route))
+                best[uav][key] = max(value, best[uav].get(key, -np.inf))
+    most = [max(w - float(price[list(k)].sum()) for k, w in each.items()) for each in best]
+    slack = share * (1.0 + max(most))
+
+    found = worthy_timed_lists(
+        team_at_start(problem),
+        price,
+        np.array(most),
+        slack,
+        bucket_s,
+        heads=10_000,
+        timetable=timetable,
+    )
+
+    assert found is not None
+    said: list[dict[tuple[int, ...], float]] = [{}, {}]
+    for uav, one, worth in zip(found.uav.tolist(), found.lists, found.worth, strict=True):
+        key = tuple(sorted(one))
+        assert worth == pytest.approx(timed_list_worth(problem, timetable, uav, one), rel=1e-9)
+        assert key not in said[uav]
+        said[uav][key] = worth
+    for uav in range(2):
+        for key, worth in best[uav].items():
+            more = worth - float(price[list(key)].sum()) - (most[uav] - slack)
+            if key and more > 1e-9:
+                assert said[uav][key] == pytest.approx(worth, rel=1e-9)
+            elif more < -1e-9:
+                assert key not in said[uav]
+
+
+def test_too_many_worthy_timed_lists_are_none() -> None:
+    team = team_at_start(any_problem(1, 3, 30))
+
+    assert worthy_timed_lists(team, np.zeros(30), np.zeros(3), 1.0, 0.1, heads=50) is None
+
+
 def test_search_among_real_lists_only_lowers_the_bound() -> None:
     problem = any_problem(7, 3, 12)
     team = team_at_start(problem)
@@ -154,7 +213,12 @@ def test_told_to_give_up_it_has_no_answer() -> None:
     team = team_arrays(problem, state, state.active, 0.0)
     bucket_s = problem.horizon_s / 400.0
 
-    assert relaxed_lists(team, np.zeros(200), bucket_s, should_stop=lambda: True) is None
+    price, most = np.zeros(200), np.zeros(3)
+    assert relaxed_lists(team, price, bucket_s, should_stop=lambda: True) is None
+    assert (
+        worthy_timed_lists(team, price, most, 0.0, bucket_s, heads=10_000, should_stop=lambda: True)
+        is None
+    )
 
 
 @pytest.mark.parametrize(
@@ -176,3 +240,25 @@ def test_wrong_arguments_are_refused_by_name(
 
     with pytest.raises(ValueError, match=name):
         relaxed_lists(team, np.array(price), bucket_s, threads=threads)
+    with pytest.raises(ValueError, match=name):
+        worthy_timed_lists(
+            team, np.array(price), np.zeros(3), 0.0, bucket_s, heads=1, threads=threads
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "most", "slack", "heads"),
+    [
+        ("most", np.zeros(2), 0.0, 1),
+        ("most", np.full(3, np.nan), 0.0, 1),
+        ("slack", np.zeros(3), -1.0, 1),
+        ("heads", np.zeros(3), 0.0, 0),
+    ],
+)
+def test_wrong_wishes_for_worthy_lists_are_refused_by_name(
+    name: str, most: npt.NDArray[np.float64], slack: float, heads: int
+) -> None:
+    team = team_at_start(table_1())
+
+    with pytest.raises(ValueError, match=name):
+        worthy_timed_lists(team, np.ones(8), most, slack, 0.1, heads=heads)

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.planner.bound import upper_bound
+from coordinator.planner.bound import meets, upper_bound
 from coordinator.planner.plan import guided_plan
 from sim.study.generator import mission_of, random_mission
 from sim.study.policies.agents import GUIDED, GUIDED_ALONE
@@ -176,15 +176,17 @@ def test_it_is_reached_by_one_uav_whose_legs_do_not_vary_and_who_tries_once(
     assert clairvoyant_bound(fate) == pytest.approx(max(0.0, most), rel=1e-6)
 
 
-@pytest.mark.parametrize(("n_uav", "n_task"), [(5, 20), (2, 12)])
-def test_without_uncertainty_it_is_close_to_the_bound_on_plans(n_uav: int, n_task: int) -> None:
-    problem = random_mission(n_uav, n_task, 4)
+@pytest.mark.parametrize(("n_uav", "n_task", "seed"), [(5, 20, 4), (2, 12, 4), (10, 50, 2)])
+def test_without_uncertainty_it_is_no_larger_than_the_bound_on_plans(
+    n_uav: int, n_task: int, seed: int
+) -> None:
+    problem = random_mission(n_uav, n_task, seed)
     plan = guided_plan(problem, threads=1)
 
     bound = clairvoyant_bound(CALM.draw(mission_of(problem, "calm"), SPAN_S, 0))
 
     assert plan.objective * (1.0 - 1e-9) <= bound
-    assert bound <= upper_bound(problem, plan.routes, threads=1).objective * 1.005
+    assert meets(bound, upper_bound(problem, plan.routes, threads=1).objective)
 
 
 def test_it_is_close_to_what_hindsight_reaches() -> None:
