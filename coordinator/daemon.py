@@ -39,6 +39,7 @@ from swarm.protocol.messages import Snapshot
 from swarm.protocol.seal import Seal
 from swarm.protocol.timing import PRESETS, LinkKind, Timing
 from swarm.runtime.clock import Clock, SystemClock
+from swarm.runtime.log import get_logger
 from swarm.runtime.process import SERVICE_NOTIFIER, call_in_background
 from swarm.runtime.shell import Shell, join_mission
 from swarm.runtime.store import Store
@@ -101,7 +102,13 @@ async def run_coordinator(
         answer_s=answer_s,
         context=context,
     )
-    planner = BackgroundPlanner(make_plan, shell.step, shell.fail)
+    log = get_logger(COORDINATOR, mission=mission.name)
+
+    def note(fault: Exception, failed: int) -> None:
+        reason = f"{type(fault).__name__}: {fault}"
+        log.warning("a plan that nobody waits for failed", reason=reason, failed=failed)
+
+    planner = BackgroundPlanner(make_plan, shell.step, shell.fail, note)
     watches = isinstance(core, StandbyCore)
     join_mission(bus, mission.name, None if watches else COORDINATOR, status=False)
     if (
@@ -124,6 +131,7 @@ class BackgroundPlanner:
         make_plan: plans a mission as it is wanted; told to stop once nobody waits for the plan.
         tell: takes the plan.
         fail: takes what a planner raises, unless it says that there is no plan.
+        note: told what it raises once nobody waits for the plan, and how often it has done so.
     """
 
     def __init__(
@@ -131,10 +139,14 @@ class BackgroundPlanner:
         make_plan: MissionPlanner,
         tell: Callable[[CoordinatorEvent], None],
         fail: Callable[[BaseException], None],
+        note: Callable[[Exception, int], None],
     ) -> None:
         self._make_plan = make_plan
         self._tell = tell
         self._fail = fail
+        self._note = note
+        self._failed = 0
+        """Plans that failed once nobody waited for them."""
         self._wanted: MakePlan | Replan | None = None
         """What is to be planned next."""
         self._unwanted = threading.Event()
@@ -171,9 +183,11 @@ class BackgroundPlanner:
                 name = "planner" if isinstance(request, MakePlan) else "replanner"
                 try:
                     outcome = await asyncio.wrap_future(call_in_background(call, name))
-                except Exception:
+                except Exception as fault:
                     if not unwanted.is_set():
                         raise
+                    self._failed += 1
+                    self._note(fault, self._failed)
                     continue
                 if not unwanted.is_set():
                     self._tell(outcome)

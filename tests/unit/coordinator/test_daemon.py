@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import threading
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 from functools import partial
@@ -214,7 +214,16 @@ class PlansInTurn:
         self.told: list[CoordinatorEvent] = []
         self.faults: list[BaseException] = []
         self.may_end = threading.Event()
-        self.planner = BackgroundPlanner(self.plan, self.told.append, self.faults.append)
+        self.noted: list[tuple[str, int]] = []
+        self.planner = self.planning(self.plan, self.told.append)
+
+    def planning(
+        self, make_plan: MissionPlanner, told: Callable[[CoordinatorEvent], None]
+    ) -> BackgroundPlanner:
+        def note(fault: Exception, failed: int) -> None:
+            self.noted.append((type(fault).__name__, failed))
+
+        return BackgroundPlanner(make_plan, told, self.faults.append, note)
 
     def plan(self, wanted: MakePlan, unwanted: ShouldStop) -> Plan:
         self.begun.append(wanted.request)
@@ -261,7 +270,7 @@ def test_a_plan_may_be_wanted_by_who_is_told_of_another() -> None:
             plans.begin(2)
 
     async def scenario() -> None:
-        plans.planner = BackgroundPlanner(plans.plan, told, plans.faults.append)
+        plans.planner = plans.planning(plans.plan, told)
         plans.begin(1)
         await until(lambda: plans.told_of == [1, 2], "both plans")
 
@@ -285,27 +294,30 @@ def test_nobody_is_told_of_a_plan_that_was_given_up_and_closing_waits_for_its_en
     assert (plans.ended, plans.told) == ([1, 2], [])
 
 
-def test_a_fault_in_a_plan_that_nobody_wants_any_more_is_not_heard() -> None:
+def test_faults_in_plans_that_nobody_wants_any_more_are_noted_and_end_nothing() -> None:
     plans = PlansInTurn()
 
-    def fails_first(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
+    def fails_sooner(wanted: MakePlan, unwanted: ShouldStop) -> Plan:
         plan = plans.plan(wanted, unwanted)
-        if wanted.request == 1:
+        if wanted.request < 3:
             raise OwnError
         return plan
 
     async def scenario() -> None:
-        plans.planner = BackgroundPlanner(fails_first, plans.told.append, plans.faults.append)
+        plans.planner = plans.planning(fails_sooner, plans.told.append)
         plans.begin(1)
         await until(lambda: plans.begun == [1], "the first plan")
         plans.begin(2)
-        await until(lambda: plans.begun == [1, 2], "the newest plan")
+        await until(lambda: plans.begun == [1, 2], "the second plan")
+        plans.begin(3)
+        await until(lambda: plans.begun == [1, 2, 3], "the newest plan")
         plans.may_end.set()
-        await until(lambda: plans.told_of == [2], "what comes of it")
+        await until(lambda: plans.told_of == [3], "what comes of it")
         await plans.planner.close()
 
     play(scenario)
     assert plans.faults == []
+    assert plans.noted == [("OwnError", 1), ("OwnError", 2)]
 
 
 def test_a_running_mission_is_planned_anew_beside_the_loop() -> None:
