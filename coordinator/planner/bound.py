@@ -59,8 +59,9 @@ _FIRST_ROUGH_STEP, _LAST_ROUGH_STEP = 0.03, 0.012
 """As shares of the bound per task."""
 _ROUGH_FRAC = 0.4
 """The most of a limit that goes by before the first bound is worked out."""
-_HEADS_TIMES_TASKS, _FEWEST_HEADS = 2_000_000, 200
-"""Beginnings of a list that are continued at most: some 20 ms."""
+_HEADS_TIMES_TASKS, _FEWEST_HEADS, _MOST_HEADS = 2_000_000, 200, 100_000
+"""Beginnings of a list that are continued at most, some 20 ms, in the first round of prices; twice
+as many in each round after it, as what is cut off matters the more the better prices are."""
 _ROUNDING = 2e-10
 _MET = 1e-9
 _CLOSING_HEADS = 100_000
@@ -157,9 +158,15 @@ def upper_bound(
     known = _Known.of(problem, lists)
     price, bundle = known.price, known.bundle(problem.n_uav)
     price = _approached(team, price, bundle, beginning_of(should_stop, _ROUGH_FRAC), threads)
-    heads = max(_FEWEST_HEADS, _HEADS_TIMES_TASKS // problem.n_task)
+    heads = max(_FEWEST_HEADS, _HEADS_TIMES_TASKS // problem.n_task) // 2
+
+    def priced(price: FloatArray) -> PricedLists | None:
+        nonlocal heads
+        heads = max(heads, min(2 * heads, _MOST_HEADS))
+        return price_lists(team, price, heads=heads, threads=threads, should_stop=stops)
+
     relaxed = lagrangian_bound(
-        partial(price_lists, team, heads=heads, threads=threads, should_stop=stops),
+        priced,
         price,
         bundle,
         enough=known.worth,
