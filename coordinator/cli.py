@@ -97,7 +97,8 @@ def plan(
     Of a scenario of schema 2 also the schedule: swaps, waits, ways home, and what is left out.
     Tasks that appear later are unknown to a plan. The same seed gives the same plan,
     unless --time-limit-s cuts the search short. That limit holds for all but drawing, exporting
-    and what --bound-s adds: reading, searching and the bound. Ctrl-C ends the search with the
+    and what --bound-s adds: reading, searching and the bound. With exact the search is the proof,
+    and --bound-s what follows where it was cut short. Ctrl-C ends the search with the
     best so far.
 
     Examples:
@@ -134,7 +135,7 @@ def plan(
         require_origin(mission, str(scenario))
     try:
         with _searching() as (interrupted, progress, proving):
-            whole_s, kept_frac = whole_limit(time_limit_s, bound_s)
+            whole_s, kept_frac = whole_limit(time_limit_s, bound_s, proves=method == "exact")
             limit = None if whole_s is None else after_time(clock, whole_s, begin_s)
             result = make_plan(
                 mission,

@@ -83,10 +83,11 @@ def make_field_plan(asked: FieldRequest) -> Plan:
     begin_s = asked.clock.now_s()
     problem = _problem_of(asked.mission, asked.rates)
     ends = never if asked.stop is None else asked.stop
-    search = _FieldSearch(problem, method, asked, ends)
-    optimum = search.optimum()
-    keeps = optimum is None and asked.bound_s is not None and asked.bound_frac > 0.0
-    found = search.lists(optimum, part_of(ends, 1.0 - asked.bound_frac) if keeps else ends)
+    keeps = asked.bound_s is not None and asked.bound_frac > 0.0
+    search_ends = part_of(ends, 1.0 - asked.bound_frac) if keeps else ends
+    search = _FieldSearch(problem, method, asked)
+    optimum = search.optimum(search_ends if method == "exact" else ends)
+    found = search.lists(optimum, search_ends if optimum is None else ends)
     if asked.stop is not None:  # which may have been before anything was found
         found = search.at_least_greedy(found)
     flown = fly_lists(problem.kernel, FieldState.at_start(problem, found.sequence), found.lists)
@@ -152,11 +153,9 @@ class _FieldSearch:
     problem: FieldProblem
     method: str
     asked: FieldRequest
-    ends: ShouldStop
 
-    def optimum(self) -> FieldPlanLists | None:
+    def optimum(self, ends: ShouldStop) -> FieldPlanLists | None:
         """What ``exact`` finds where it is asked for or quick; None otherwise, or if stopped."""
-        ends = self.ends
         known: tuple[tuple[int, ...], ...] = ()
         if self.method == "exact":
             known = self._guided(after_evaluations(_KNOWN_ITERATIONS)).lists

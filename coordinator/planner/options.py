@@ -38,15 +38,18 @@ def bound_frac(time_limit_s: float | None) -> float:
     return min(_BOUND_FRAC, BOUND_S / time_limit_s) if time_limit_s else 0.0
 
 
-def whole_limit(time_limit_s: float | None, bound_s: float | None) -> tuple[float | None, float]:
+def whole_limit(
+    time_limit_s: float | None, bound_s: float | None, *, proves: bool = False
+) -> tuple[float | None, float]:
     """The time for search and bound together [s], and the share of it kept for the bound.
 
     Args:
         time_limit_s: for both, or for the search alone where ``bound_s`` is given [s].
         bound_s: asked for beyond that [s].
+        proves: the search is a proof itself, for which nothing is kept unless it is asked for.
     """
     if time_limit_s is None or bound_s is None:
-        return time_limit_s, bound_frac(time_limit_s)
+        return time_limit_s, 0.0 if proves else bound_frac(time_limit_s)
     whole_s = time_limit_s + bound_s
     return whole_s, bound_s / whole_s
 

@@ -213,10 +213,10 @@ def make_plan(
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop
     search = _PlanRequest(problem, method, seed, stop, progress, threads, modest, bound_progress)
-    proven = search.proven()
-    keeps = proven is None and bound_s is not None and bound_frac > 0.0
+    keeps = bound_s is not None and bound_frac > 0.0
     search_ends = part_of(ends, 1.0 - bound_frac) if keeps else ends
-    routes, sequence, evaluations = search.lists(proven, search_ends)
+    proven = search.proven(search_ends if method == "exact" else ends)
+    routes, sequence, evaluations = search.lists(proven, search_ends if proven is None else ends)
     best = None if proven is None else evaluate(problem, proven.routes)[0]
     bound = None
     if proven is None and bound_s is not None:
@@ -254,9 +254,8 @@ class _PlanRequest:
     modest: bool
     bound_progress: Callable[[float], None] | None
 
-    def proven(self) -> Optimum | None:
+    def proven(self, ends: ShouldStop) -> Optimum | None:
         """The optimum where it is asked for or quickly proven; None otherwise, or if stopped."""
-        ends = never if self.stop is None else self.stop
         if self.method != "exact":
             if estimated_s(self.problem) > _PROOF_S:
                 return None

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from coordinator.planner.exact import ProblemTooLargeError
-from coordinator.planner.options import after_evaluations, after_time
+from coordinator.planner.options import Limit, after_evaluations, after_time
 from coordinator.planner.plan import METHODS, make_plan
 from sim.study.generator import mission_of, random_mission
 from swarm.model import Mission, Task, TaskId, Uav, UavId
@@ -187,3 +187,26 @@ def test_a_proof_that_the_limit_stops_leaves_good_lists_and_no_optimum() -> None
     assert plan.objective == pytest.approx(
         make_plan(wide_mission(2, 16), "exact", clock=TickingClock()).objective, rel=0.01
     )
+
+
+def test_a_proof_leaves_the_bound_what_is_kept_for_it() -> None:
+    asked = 0
+
+    def spent_frac(evaluations: float) -> float:
+        nonlocal asked
+        asked += 1
+        return asked / 100.0
+
+    plan = make_plan(
+        wide_mission(2, 16),
+        "exact",
+        clock=TickingClock(),
+        stop=Limit(spent_frac),
+        bound_s=1e6,
+        bound_frac=0.97,
+        threads=1,
+    )
+
+    assert plan.evaluations > 0  # the proof was stopped
+    assert plan.optimum is not None  # the bound closed
+    assert asked < 100

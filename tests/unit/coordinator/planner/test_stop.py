@@ -10,6 +10,7 @@ from coordinator.planner.options import (
     first_of,
     never,
     part_of,
+    whole_limit,
 )
 
 
@@ -95,3 +96,9 @@ def test_asked_about_nothing_only_time_and_wishes_end_it() -> None:
     assert not stop(0)
     clock.time_s += 1.0
     assert stop(0)
+
+
+def test_nothing_of_a_limit_is_kept_from_a_proof_unless_it_is_asked_for() -> None:
+    assert whole_limit(10.0, None) == (10.0, 0.25)
+    assert whole_limit(10.0, None, proves=True) == (10.0, 0.0)
+    assert whole_limit(10.0, 30.0, proves=True) == (40.0, 0.75)
