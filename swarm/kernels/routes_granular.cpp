@@ -132,7 +132,8 @@ void GranularSearch::ruin() {
     }
     const int n = lists_.size(list);
     const int length = 1 + random_.below(std::min(kMostTorn, n));
-    const int from = std::max(0, std::min(lists_.place_of(task) - random_.below(length), n - length));
+    const int before_task = random_.below(length);
+    const int from = std::max(0, std::min(lists_.place_of(task) - before_task, n - length));
     scratch_ = lists_.route(list);
     torn_.insert(torn_.end(), scratch_.begin() + from, scratch_.begin() + from + length);
     scratch_.erase(scratch_.begin() + from, scratch_.begin() + from + length);

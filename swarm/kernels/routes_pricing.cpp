@@ -66,7 +66,9 @@ std::vector<WorthyLists> worthy_lists(const Problem& problem, const Start& start
   std::vector<WorthyLists> found(start.active.size());
   std::atomic<bool> missing{false};  // then all is in vain
   for_active(start, pricing.threads, watch, [&](int uav) {
-    if (!missing) found[uav] = worthy_list(problem, start, uav, pricing, most[uav] - pricing.slack, watch);
+    if (!missing)
+      found[uav] =
+          worthy_list(problem, start, uav, pricing, most[uav] - pricing.slack, watch);
     if (missing || !found[uav].all) {
       found[uav] = {false, {}, {}};
       missing = true;

@@ -70,14 +70,15 @@ void bind_routes_pricing(nb::module_& module) {
         std::vector<PricedList> found;
         bool stopped = false;
         PythonWatch(should_stop).released([&](Watch& watch) {
-          found = price_lists(problem, arrays.start(problem), {tasks, price, heads, near, 0.0, threads}, watch);
+          found = price_lists(problem, arrays.start(problem),
+                              {tasks, price, heads, near, 0.0, threads}, watch);
           stopped = watch.stopped();
         });
         return given(!stopped, found);
       },
       nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
-      nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("heads"), nb::arg("near"), nb::arg("threads"),
-      nb::arg("should_stop") = nb::none());
+      nb::arg("active"), nb::arg("open"), nb::arg("prices"), nb::arg("heads"), nb::arg("near"),
+      nb::arg("threads"), nb::arg("should_stop") = nb::none());
 
   module.def(
       "worthy_lists",
@@ -90,8 +91,8 @@ void bind_routes_pricing(nb::module_& module) {
         std::vector<WorthyLists> found;
         bool all = true;
         PythonWatch(should_stop).released([&](Watch& watch) {
-          found = worthy_lists(problem, arrays.start(problem), {tasks, price, heads, 0, slack, threads},
-                               bests, watch);
+          found = worthy_lists(problem, arrays.start(problem),
+                               {tasks, price, heads, 0, slack, threads}, bests, watch);
           all = !watch.stopped();
         });
         return given(all, found);

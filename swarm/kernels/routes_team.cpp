@@ -19,8 +19,8 @@ constexpr int kHeatSteps = 64;
 constexpr double kTo100th = 0.930572040929699;  // its 64th power is 1/100
 constexpr double kTo500th = 0.9074623044174637;   // and of this one 1/500
 
-// Measured: the first on published instances, the others on random missions. Lists to begin with are
-// good ones, which heat only spoils; lists that were just put together gain by much of it.
+// Measured: the first on published instances, the others on random missions. Lists to begin with
+// are good ones, which heat only spoils; lists that were just put together gain by much of it.
 constexpr Annealing kLong{3.0, kTo100th, 200.0, 0.0};
 constexpr Annealing kBegun{1.5, kTo100th, 1600.0, 15.0};
 constexpr Annealing kAnew{5.0, kTo500th, 800.0, 10.0};
@@ -115,7 +115,8 @@ void TeamSearch::polish(Watch& watch) {
 void TeamSearch::divide() {
   std::vector<Middle> middles;
   for (const int uav : uavs_) {
-    Middle middle{start_.place_m[3 * std::size_t(uav)], start_.place_m[3 * std::size_t(uav) + 1], uav};
+    const double* start_m = &start_.place_m[3 * std::size_t(uav)];
+    Middle middle{start_m[0], start_m[1], uav};
     const Route& route = current_[uav];
     if (!route.empty()) {
       middle.x_m = middle.y_m = 0.0;
