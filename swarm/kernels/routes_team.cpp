@@ -15,6 +15,7 @@ constexpr int kUavsPerLane = 12;
 constexpr int kUavsToDivide = 10;  // fewer are not divided
 constexpr int kShortList = 80;     // tasks a UAV; up to some 60, Search does as well or better
 constexpr std::size_t kManyTasks = 2000;
+constexpr double kMostBehind = 3.0;  // temperatures; measured, as Annealing below
 constexpr int kHeatSteps = 64;
 constexpr double kTo100th = 0.930572040929699;  // its 64th power is 1/100
 constexpr double kTo500th = 0.9074623044174637;   // and of this one 1/500
@@ -96,7 +97,7 @@ void TeamSearch::round(long iterations, double heat, int threads, Watch& watch) 
   for (int k = 1; k < std::min<int>(threads, n_lane()); ++k) helpers.emplace_back(work);
   work();
   for (std::thread& helper : helpers) helper.join();
-  join();
+  join(now);
 }
 
 void TeamSearch::polish(Watch& watch) {
@@ -149,16 +150,21 @@ void TeamSearch::divide(Middle* from, Middle* to, int lane, int lanes, double ea
   divide(middle, to, lane + half, lanes - half, -north, east);
 }
 
-void TeamSearch::join() {
-  double value = 0.0;
+// Lanes of one long list that are further behind than heat explains begin anew from the best. Of
+// several lists, two different searches are worth more.
+void TeamSearch::join(double temperature) {
   if (!divided_) {
     for (const auto& lane : lanes_) {
       if (!(lane->best_value() > best_value_)) continue;
       best_value_ = lane->best_value();
       for (const int uav : uavs_) best_[uav] = lane->best_route(uav);
     }
+    if (!terms_ || uavs_.size() > 1) return;
+    for (const auto& lane : lanes_)
+      if (best_value_ - lane->best_value() > kMostBehind * temperature) lane->load(best_, uavs_);
     return;
   }
+  double value = 0.0;
   for (const auto& lane : lanes_) value += lane->best_value();
   const bool better = value > best_value_;
   if (better) best_value_ = value;

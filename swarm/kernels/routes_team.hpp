@@ -3,7 +3,8 @@
 // A round hands every lane some UAVs and their lists, runs the lanes' searches side by side and
 // joins what they found; J is a sum over UAVs, so parts are found apart and added. How UAVs are
 // divided follows from the seed and the team alone, never from the number of threads. Small teams
-// are not divided: each lane then searches the whole by its own random numbers.
+// are not divided: each lane then searches the whole by its own random numbers; on one long list
+// it begins anew from the best of all lanes once it has fallen far behind.
 #pragma once
 
 #include <memory>
@@ -59,7 +60,7 @@ class TeamSearch {
 
   void divide();
   void divide(Middle* from, Middle* to, int lane, int lanes, double east, double north);
-  void join();
+  void join(double temperature);
 
   const Problem& problem_;
   const Start& start_;

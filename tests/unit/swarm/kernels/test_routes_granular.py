@@ -129,6 +129,23 @@ def test_long_lists_hold_every_task_once_and_are_worth_what_eq_1_says(
     assert (other, same) == (lists, worth)
 
 
+@pytest.mark.parametrize("n_uav", [1, 3])
+@pytest.mark.parametrize("due", [False, True])
+def test_lanes_that_learn_of_each_other_find_the_same_with_any_number_of_threads(
+    n_uav: int, due: bool
+) -> None:
+    places = np.random.default_rng(n_uav).uniform(0.0, 100.0, (101, 2))
+    leg_s = np.floor(np.hypot(*(places[:, None] - places[None]).transpose(2, 0, 1)))
+    due_s = np.full(100, 1500.0) if due else None
+    times = GivenTimes(leg_s[0, 1:], leg_s[1:, 1:], due_s)
+    team = team_of(alike_problem(n_uav, 100))
+
+    runs = [optimise_routes(team, iterations=2000, threads=n, given=times) for n in (1, 2, 3)]
+
+    assert runs[0] == runs[1] == runs[2]
+    assert worth_of(times, runs[0][0]) == runs[0][1]
+
+
 def test_capabilities_and_closed_tasks_are_heeded_in_long_lists() -> None:
     rng = np.random.default_rng(11)
     success = rng.uniform(0.3, 1.0, (2, 240))
