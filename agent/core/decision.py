@@ -79,7 +79,7 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: DecisionTurn) -
         rule: of the epoch in force; see `swarm.protocol.board.rule_of`.
         turn: who decides, when and where.
     """
-    mine = problem.uav_ids.index(turn.uav)
+    mine = problem.row_of[turn.uav]
     state, order = _team_at(problem, board, turn)
     if not state.open.any():
         return None
@@ -102,10 +102,10 @@ def decide_diversion(
         turn: who decides, when and where; it became free just now.
         claim: its claim, on a task of ``problem``.
     """
-    current = next((i for i, task in enumerate(problem.task_ids) if task == claim.task), None)
+    current = problem.column_of.get(claim.task or "")
     if current is None:
         return None
-    mine = problem.uav_ids.index(turn.uav)
+    mine = problem.row_of[turn.uav]
     free, order = _team_at(problem, board, turn)
     flying_on = free.copy()
     finish_claim(problem, flying_on, mine, current, claim)
@@ -130,17 +130,17 @@ def _team_at(problem: Problem, board: TaskBoard, turn: DecisionTurn) -> tuple[Te
         for uav, claim in replica.claims.items()
         if uav in turn.credible and uav not in stronger and claim.task is not None
     }
-    columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
+    columns = problem.column_of
     state = after_outcomes(problem, board)
     taken = {claim.task for claim in stronger.values()} | set(turn.excluded)
-    state.open[[columns[task] for task in taken if task in columns]] = False
+    state.open[[columns[task] for task in taken if task is not None and task in columns]] = False
     for index, uav in enumerate(problem.uav_ids):
         claim = stronger.get(uav)
         state.active[index] = True
         if uav == turn.uav:
             state.free_s[index] = turn.now_s
             state.place_enu_m[index] = turn.place_enu_m
-        elif claim is not None and claim.task in columns:
+        elif claim is not None and claim.task is not None and claim.task in columns:
             finish_claim(problem, state, index, columns[claim.task], claim)
             # Who is a little late is about to decide, or its word is on its way; who is later may
             # come any moment, and nobody waits for it.

@@ -246,7 +246,8 @@ class FieldTasking(Tasking):
         task = self._replica.board[str(decision.task)]
         standing = self._visits.claim if self._visits.stands_at is not None else None
         self._machine.take(Trigger.DECIDED if left is None else Trigger.DIVERTED)
-        self._free.retry_at_s, self._free.adrift, self._diversion_due = None, False, False
+        self._free.retry_at_s, self._free.adrift = None, False
+        self._opened.clear()
         self._attempt = TaskAttempt(held_at_s=now_s + self._timing.objection_window_s)
         ends_s = decision.sortie_end_s
         claim = Claim(

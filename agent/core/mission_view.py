@@ -252,12 +252,12 @@ class Peers:
 
     def winner(self, replica: Replica, task: str) -> str | None:
         """Whose claim on ``task`` is the strongest that counts, the own among them."""
-        claims = replica.claims.items()
+        claims = replica.claimants.get(task, {}).items()
         return winner(
             [
                 (uav, claim)
                 for uav, claim in claims
-                if claim.task == task and (uav == self._uav or self.membership.is_credible(uav))
+                if uav == self._uav or self.membership.is_credible(uav)
             ]
         )
 

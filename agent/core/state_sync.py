@@ -16,7 +16,16 @@ from agent.core.mission_view import MissionChange
 from agent.core.tasking import Tasking
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import Ask
-from swarm.protocol.messages import Body, Message, MissionConfig, MissionPhase, PlanEpoch, Snapshot
+from swarm.protocol.messages import (
+    Body,
+    Message,
+    MissionConfig,
+    MissionPhase,
+    PlanEpoch,
+    Snapshot,
+    TaskEdit,
+    TaskEntry,
+)
 from swarm.protocol.registers import without_signers
 from swarm.protocol.sync import QuestionTimer
 from swarm.protocol.timing import Timing, earliest
@@ -40,8 +49,8 @@ class StateSync(AgentPart):
         self._answered: set[str] = set()
         self._insisted = False
         self._insists_until_s = -math.inf
-        self._left_open = False
-        """Whether somebody was lost, and what it leaves open is not known for sure yet."""
+        self._left_by: set[str] = set()
+        """Who was lost, and what it leaves open is not known for sure yet."""
         self._echoes: list[Message] = []
         """Heard in the own name, though this life has not said so."""
 
@@ -89,9 +98,10 @@ class StateSync(AgentPart):
         self.queries.take(enough=somebody_knows and not self._machine.acts)
         answered = {snapshot.writer for snapshot in snapshots}
         self._answered |= answered & self._peers.membership.present
-        if self._left_open:
-            self._left_open = False
-            self._tasking.consider_diversion()
+        for writer in self._left_by:
+            claim = self._replica.claims.get(writer)
+            self._tasking.consider_diversion("" if claim is None else claim.task or "")
+        self._left_by.clear()
         if self.queries.current:
             self._insist(now_s)
 
@@ -153,8 +163,8 @@ class StateSync(AgentPart):
         if news is None:
             return
         self._peers.stated(message.writer, message.body, now_s)
-        if news is MissionChange.APPEARANCE:
-            self._tasking.consider_diversion()
+        if news is MissionChange.APPEARANCE and isinstance(message.body, TaskEntry | TaskEdit):
+            self._tasking.consider_diversion(message.body.task)
         if news in (MissionChange.APPEARANCE, MissionChange.OPENING):
             self._awake(now_s)
         elif news is MissionChange.CLAIM:
@@ -220,7 +230,7 @@ class StateSync(AgentPart):
             self._log("left" if left else "lost", writer=writer, why=why)
             self._awake(now_s)
             self.queries.want(now_s)  # others may have heard its last words
-            self._left_open = True
+            self._left_by.add(writer)
 
     def _greet(self, writer: str, now_s: float) -> None:
         """Somebody is there anew: tell it the own registers, and hear what it may know."""

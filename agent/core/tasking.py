@@ -35,8 +35,15 @@ from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule
 from swarm.protocol.board import RuleMaker, TaskState, ranks, rule_of
 from swarm.protocol.messages import PlanEpoch, TaskEntry
+from swarm.protocol.open_tasks import OpenTasks
 from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome
+
+_MANY_TASKS = 500
+"""Where more are open, only UAVs in whose reach something opens consider turning to it: that takes
+tens of milliseconds at 200 × 5000."""
+_REACH_TASKS = 56
+"""Within reach are so many tasks that pay best; a guided decision reconsiders as many."""
 
 
 class Tasking(AgentPart, ABC):
@@ -56,8 +63,9 @@ class Tasking(AgentPart, ABC):
         self._free = FreePeriod(0.0)
         self._attempt = TaskAttempt()
         self._refused = RefusedTasks(context.timing.reconsider_s)
-        self._diversion_due = False
-        """Whether something has opened that may be worth turning to in flight."""
+        self._opened: set[str] = set()
+        """Tasks that have opened, and may be worth turning to in flight."""
+        self._open_tasks = OpenTasks(context.mission_view.board)
 
     # -- from without ---------------------------------------------------------------
 
@@ -135,12 +143,12 @@ class Tasking(AgentPart, ABC):
             if self._mission_view.running:
                 self._free.since_s = self._mission_view.mission_s(now_s)
 
-    def consider_diversion(self) -> None:
-        """A task has appeared, or a lost UAV's has opened: it may be worth turning to in flight.
+    def consider_diversion(self, task: str) -> None:
+        """It has appeared, or was a lost UAV's: it may be worth turning to in flight.
 
         Told once for each, so no plan and nobody's change of mind can keep a UAV from arriving.
         """
-        self._diversion_due = True
+        self._opened.add(task)
 
     def peer_claimed(self, now_s: float) -> None:
         """Somebody has said what it claims; it may be whom this UAV waits for."""
@@ -177,7 +185,7 @@ class Tasking(AgentPart, ABC):
         if self._free.retry_at_s is not None and self._free.retry_at_s <= now_s:
             self.wake(now_s)
         ready = informed and self._machine.state in TAKES_TARGETS
-        if self._diversion_due and ready:
+        if self._opened and ready:
             self._divert(now_s)
         if self._machine.state in FREE and self._free.to_decide:
             if not ready:
@@ -221,7 +229,7 @@ class Tasking(AgentPart, ABC):
 
     def _divert(self, now_s: float) -> None:
         """Leave the task for a better one, unless somebody free is about to take that."""
-        self._diversion_due = False
+        opened, self._opened = self._opened, set()
         claim, epoch = self.claim, self._replica.epoch
         if claim is None or epoch is None or self._machine.state is not AgentState.FLYING:
             return
@@ -231,6 +239,8 @@ class Tasking(AgentPart, ABC):
         rule = self._rule_of(epoch)
         if not isinstance(rule, GuidedRule):
             return  # no other one values the whole team
+        if not any(map(self._is_within_reach, opened)):
+            return
         problem = self._mission_view.board.problem
         turn = self._turn(self._mission_view.mission_s(now_s), now_s)
         if problem is None or turn is None or turn.awaited:
@@ -240,6 +250,16 @@ class Tasking(AgentPart, ABC):
             self._become_free(turn.now_s)
             chosen = (RecordingRule(rule, decision.uav), decision)
             self._set_off(turn, problem, epoch, *chosen, now_s, left=claim.task)
+
+    def _is_within_reach(self, task: str) -> bool:
+        """Whether ``task`` is among those that pay best from here, or few are open."""
+        board, me = self._mission_view.board, self._mission_view.me
+        place = self._mission_view.place_enu_m
+        if board.n_open <= _MANY_TASKS or place is None or me is None:
+            return True
+        if task not in board.states:
+            return False
+        return self._open_tasks.n_better(task, place, me.speed_m_s) < _REACH_TASKS
 
     def _lost(self) -> str | None:
         """Why the claimed task is not this UAV's to do; None if it is."""
@@ -321,7 +341,8 @@ class Tasking(AgentPart, ABC):
         task = self._replica.board[problem.task_ids[decision.task]]
         rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
         self._machine.take(Trigger.DECIDED if left is None else Trigger.DIVERTED)
-        self._free.retry_at_s, self._free.adrift, self._diversion_due = None, False, False
+        self._free.retry_at_s, self._free.adrift = None, False
+        self._opened.clear()
         self._attempt = TaskAttempt(held_at_s=now_s + self._timing.objection_window_s)
         claim = Claim(
             ClaimPhase.PROPOSED, task.task, self._free.since_s, rank, decision.completion_s

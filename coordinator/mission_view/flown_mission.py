@@ -9,7 +9,8 @@ from coordinator.mission_view.results import MissionResult, dues_of, progress_of
 from swarm.allocation.objective import executed_objective
 from swarm.allocation.problem import Problem
 from swarm.model import Mission, TaskId, UavId
-from swarm.protocol.board import TaskBoard, TaskState, task_of
+from swarm.protocol.board import TaskBoard, TaskState
+from swarm.protocol.board_arrays import task_of
 from swarm.protocol.messages import TaskEdit
 from swarm.protocol.operator_commands import zone_edits, zones_in_force
 

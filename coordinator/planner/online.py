@@ -100,11 +100,10 @@ class Situation:
         under_way = {
             uav: task
             for task, uav in holders(claims).items()
-            if uav in problem.uav_ids and states.get(task) is TaskState.OPEN
+            if uav in problem.row_of and states.get(task) is TaskState.OPEN
         }
         state = after_outcomes(problem, board)
-        rows: dict[str, int] = {uav: index for index, uav in enumerate(problem.uav_ids)}
-        columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
+        rows, columns = problem.row_of, problem.column_of
         for uav, task in under_way.items():
             finish_claim(problem, state, rows[uav], columns[task], claims[uav])
         state.active[:] = [
@@ -473,7 +472,7 @@ def _by_id(problem: Problem, lists: Sequence[Sequence[int]]) -> Lists:
 
 
 def _by_index(problem: Problem, lists: Lists) -> list[list[int]]:
-    columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
+    columns = problem.column_of
     return [
         [columns[task] for task in lists.get(uav, ()) if task in columns] for uav in problem.uav_ids
     ]

@@ -26,6 +26,7 @@ from sim.bench.performance_commands import (
     autopilot,
     bound,
     dashboard,
+    flight,
     missions,
     replan,
     turnaround,
@@ -226,6 +227,7 @@ bench.command("routes", short_help="Search published instances.")(routes)
 bench.command("failover", short_help="Measure fleets in trouble.")(failover)
 bench.command("flood", short_help="Fly while a hostile peer floods the bus.")(flood)
 bench.command("missions", short_help="Fly many missions in virtual time.")(missions)
+bench.command("flight", short_help="Fly one large mission in virtual time.")(flight)
 bench.command("replan", short_help="Time re-plans of running missions.")(replan)
 bench.command("dashboard", short_help="Measure what a dashboard costs.")(dashboard)
 bench.command("autopilot", short_help="Measure simulated vehicles.")(autopilot)

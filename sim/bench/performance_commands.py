@@ -1,4 +1,5 @@
-"""Commands of `swarm bench`: `turnaround`, `autopilot`, `dashboard`, `missions`, `replan`, `bound`.
+"""Commands of `swarm bench`: `turnaround`, `autopilot`, `dashboard`, `missions`, `flight`, `replan`
+and `bound`.
 
 They measure how long things take, how much one process carries, and how much is proven.
 """
@@ -263,6 +264,55 @@ def missions(
             jobs or default_threads(),
             SystemClock(),
             lambda flown: bar.advance(flying, flown),
+        )
+    show(done, json=json)
+    return 0
+
+
+def flight(
+    size: Annotated[
+        str, typer.Option("--size", metavar="NxM", help="UAVs and tasks of the random mission.")
+    ] = "200x5000",
+    loss: Annotated[float | None, option_of(ChanceOptions, "loss")] = None,
+    popup: Annotated[float | None, option_of(ChanceOptions, "popup")] = None,
+    coordinator: Annotated[
+        bool,
+        typer.Option(
+            "--coordinator/--no-coordinator",
+            help="Whether the coordinator lives and plans anew; else it dies at the start.",
+        ),
+    ] = True,
+    seed: SeedOption = 0,
+    json: JsonOption = False,
+) -> int:
+    """Fly one large mission in virtual time: its value, and how long decisions and re-plans take.
+
+    The real cores of all agents and of the coordinator fly it in one process, on an ideal bus.
+    Unless --loss and --popup say otherwise, 30% of the UAVs are lost and 30% of the tasks pop
+    up. Times are processor time; all else follows from the seed.
+
+    Examples:
+        swarm bench flight
+        swarm bench flight --no-coordinator
+        swarm bench flight --size 50x500 --seed 3 --json
+    """
+    from sim.bench.flight import measure_flight
+    from sim.world.uncertainty import Uncertainty
+    from swarm.runtime.clock import SystemClock
+
+    n_uav, n_task = size_of("--size", size)
+    uncertainty = Uncertainty(
+        loss=_LOSS if loss is None else loss, popup=_POPUP if popup is None else popup
+    )
+    with progress() as tell:
+        done = measure_flight(
+            n_uav,
+            n_task,
+            seed,
+            uncertainty,
+            SystemClock(),
+            coordinator=coordinator,
+            progress=tell,
         )
     show(done, json=json)
     return 0

@@ -25,7 +25,14 @@ from sim.world.network import IdealNetwork, Network, NetworkConditions, Topology
 from sim.world.outcome import Tally
 from sim.world.rough_network import RoughNetwork
 from sim.world.scripted_operator import ScriptedOperator
-from sim.world.settings import QUIET, Planner, WorldSettings, vehicles_of
+from sim.world.settings import (
+    QUIET,
+    Planner,
+    Replanner,
+    WorldSettings,
+    planned_anew,
+    vehicles_of,
+)
 from sim.world.uncertainty import FleetPartition, Realization, Uncertainty
 from sim.world.vehicles import (
     IdealVehicle,
@@ -86,6 +93,7 @@ class StochasticWorld:
         make_agent: Callable[..., AgentCore] = AgentCore,
         make_observer: ObserverMaker | None = None,
         clears_slots_s: float | None = None,
+        replan: Replanner = planned_anew,
     ) -> None:
         self.fate = fate
         self._clears_slots_s = clears_slots_s
@@ -114,6 +122,7 @@ class StochasticWorld:
             timing=self._timing,
             setting=WorldSettings(
                 network=partial(_network, fate),
+                replan=replan,
                 start_timeout_s=_START_S,
                 vehicle=_vehicles(fate),
                 agent=make_agent,

@@ -41,7 +41,7 @@ _TASK_AXIS: Mapping[str, int] = {
 """Those that say something of tasks, and along which axis."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Problem:
     """Arrays of eq. 1; read-only copies of what is passed in.
 
@@ -78,6 +78,10 @@ class Problem:
     """(n_uav, n_task) success > 0."""
     weight: FloatArray = field(init=False, repr=False)
     """(n_uav, n_task) p · m."""
+    row_of: Mapping[str, int] = field(init=False, repr=False)
+    """Row of each UAV by its id."""
+    column_of: Mapping[str, int] = field(init=False, repr=False)
+    """Column of each task by its id."""
     _task_columns_m: FloatArray = field(init=False, repr=False)
     """(3, n_task) the places again, one contiguous row per axis."""
 
@@ -105,6 +109,9 @@ class Problem:
         object.__setattr__(self, "kernel", kernel)
         object.__setattr__(self, "capable", kernel.capable)
         object.__setattr__(self, "weight", kernel.weight)
+        object.__setattr__(self, "row_of", {uav: row for row, uav in enumerate(self.uav_ids)})
+        columns = {task: column for column, task in enumerate(self.task_ids)}
+        object.__setattr__(self, "column_of", columns)
         self._freeze("_task_columns_m", np.ascontiguousarray(self.task_enu_m.T))
 
     def __reduce__(self) -> tuple[type[Problem], tuple[object, ...]]:

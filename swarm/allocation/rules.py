@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from weakref import ReferenceType, ref
 
 import numpy as np
 
@@ -100,7 +101,8 @@ class GuidedRule:
     ) -> None:
         self._lists = {uav: tuple(tasks) for uav, tasks in lists.items()}
         self._repair_iterations = repair_iterations
-        self._problem: Problem | None = None
+        self._known_of: ReferenceType[Problem] | None = None
+        """The problem asked about last; not kept from being forgotten by all others."""
         self._routes: Routes = []
         self._owner: IntArray = np.zeros(0, dtype=np.int64)
         self._lacks_some = False
@@ -147,10 +149,10 @@ class GuidedRule:
 
     def _look_up(self, problem: Problem) -> None:
         """Find the listed tasks among those of the problem."""
-        if self._problem is problem:
+        if self._known_of is not None and self._known_of() is problem:
             return
-        self._problem = problem
-        index: dict[str, int] = {task: i for i, task in enumerate(problem.task_ids)}
+        self._known_of = ref(problem)
+        index = problem.column_of
         self._routes = [
             [index[task] for task in self._lists.get(uav, ()) if task in index]
             for uav in problem.uav_ids

@@ -8,25 +8,34 @@ passes in by leaving the lost out.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from bisect import insort
+from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import StrEnum
 from itertools import islice
+
+import numpy as np
 
 from swarm.allocation import field
 from swarm.allocation.lower_level import Rule, TeamState
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
-from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.model import Mission, Task
 from swarm.model.mission import PLAIN_CONSTRAINTS
+from swarm.protocol.board_arrays import (
+    BOARD_ARRAYS,
+    BoardArrays,
+    board_order,
+    fleet_of,
+    mission_with,
+    task_of,
+)
 from swarm.protocol.calibration import (
     FlightRates,
     field_as_flown,
-    fleet_as_flown,
     flight_rates,
 )
 from swarm.protocol.encoding import FIELD_DEFAULTS
-from swarm.protocol.field_messages import ZoneSpec
-from swarm.protocol.messages import MissionConfig, PostedTask, TaskEntry, UavSpec
+from swarm.protocol.messages import MissionConfig, TaskEntry
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase
@@ -83,12 +92,11 @@ def anything_doable(board: TaskBoard, present: Collection[str]) -> bool:
         for index, uav in enumerate(problem.uav_ids)
         if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
     ]
-    # In board order, as the problem's tasks are; mostly one of the first that are open will do.
-    open_ = [
-        column for column, state in enumerate(board.states.values()) if state is TaskState.OPEN
-    ]
-    first, rest = open_[:_LOOKED_AT_FIRST], open_[_LOOKED_AT_FIRST:]
-    return any(some and bool(problem.capable[:, some][able].any()) for some in (first, rest))
+    states, capable = board.states, problem.capable
+    open_ = (c for c, task in enumerate(problem.task_ids) if states.get(task) is TaskState.OPEN)
+    # Mostly one of the first will do.
+    first = list(islice(open_, _LOOKED_AT_FIRST))
+    return bool(capable[:, first][able].any() or capable[:, list(open_)][able].any())
 
 
 class TaskBoard:
@@ -99,8 +107,6 @@ class TaskBoard:
         self._name = mission
         self._entries: list[TaskEntry] = []
         """In board order."""
-        self._untried: dict[str, TaskState] = {}
-        """In board order, what each task would be if nobody had attempted any."""
         self._entries_version = -1
         self._brief: MissionConfig | None = None
         self._fleet: Mission | None = None
@@ -117,32 +123,43 @@ class TaskBoard:
         self._field_version = -1
         self._field_rates: dict[str, FlightRates] = {}
         self._states: dict[str, TaskState] = {}
-        self._unfinished = False
+        self.generation = 0
+        """Of the states: grows when they were worked out anew, not when some came or changed."""
+        self._n_open = 0
+        self._ended: list[tuple[float, int, str, str]] = []
         self._basis: tuple[int, int] | None = None
         """Versions of brief and board, and of outcomes apart from further ones, of the states."""
         self._attempts = 0
         """How many outcomes the states take into account."""
-        self._columns: list[Task] = []
-        """Of the problem."""
-        self._fleet_of_problem: Mission | None = None
-        self._problem: Problem | None = None
-        self._problem_version = -1, -1
+        self._arrays: BoardArrays | None = None
+        self._arrays_version = -1, -1
         self._rates: dict[str, FlightRates] = {}
         self._rates_version = -1, -1
-        self._flown: tuple[Mission, dict[str, FlightRates], Mission] | None = None
-        """The fleet, its rates, and what comes of both."""
 
     @property
     def states(self) -> dict[str, TaskState]:
-        """State of every task on the board, in board order, until the replica changes."""
+        """State of every task on the board, in the order of the replica's board."""
         self._catch_up()
         return self._states
 
     @property
+    def ended(self) -> list[tuple[float, int, str, str]]:
+        """Completion [s], number, task and UAV of every attempt at a task on the board, in that
+        order: one after the other, and at one time in board order.
+        """
+        self._catch_up()
+        return self._ended
+
+    @property
     def unfinished(self) -> bool:
         """Whether any task on the board is open."""
+        return self.n_open > 0
+
+    @property
+    def n_open(self) -> int:
+        """How many tasks on the board are open."""
         self._catch_up()
-        return self._unfinished
+        return self._n_open
 
     @property
     def problem(self) -> Problem | None:
@@ -151,10 +168,14 @@ class TaskBoard:
         Times of its legs hold where there is no `field_problem`.
         """
         version = self.replica.board_version, self.replica.calibration_version
-        if self._problem_version != version:
-            self._problem = self._problem_now()
-            self._problem_version = version
-        return self._problem
+        if self._arrays_version != version:
+            self._sort()
+            brief = self.replica.brief
+            self._arrays = None  # the newest of this process are kept elsewhere
+            if brief is not None:
+                self._arrays = BOARD_ARRAYS.of(self._name, brief, self._entries, self.rates)
+            self._arrays_version = version
+        return None if self._arrays is None else self._arrays.problem
 
     @property
     def mission(self) -> Mission | None:
@@ -165,7 +186,7 @@ class TaskBoard:
             self._mission = (
                 None
                 if fleet is None or brief is None
-                else _mission(self._name, brief, fleet.uavs, tasks, zones)
+                else mission_with(self._name, brief, fleet.uavs, tasks, zones)
             )
             self._mission_version = self.replica.board_version
         return self._mission
@@ -201,35 +222,12 @@ class TaskBoard:
         layers_m = [uav.layer_m for uav in brief.uavs]
         return None if mission is None else field.problem_of(mission, layers_m)
 
-    def _problem_now(self) -> Problem | None:
-        """Of `mission_of`; what nothing new was said of is not made anew."""
-        known, fleet = self._problem, self._fleet_as_flown()
-        if fleet is None:
-            return None
-        tasks = self._tasks_now()
-        before = known if fleet is self._fleet_of_problem else None
-        had = {id(task): column for column, task in enumerate(self._columns)}
-        columns = [had.get(id(task), -1) for task in tasks]
-        self._columns, self._fleet_of_problem = tasks, fleet
-        if before is None:
-            return Problem.from_mission(fleet, tasks=tasks)
-        return before.with_tasks(fleet, tasks, columns)
-
-    def _fleet_as_flown(self) -> Mission | None:
-        """The same object as long as nothing has changed that concerns it."""
-        fleet, rates = self._fleet_now(), self.rates
-        if fleet is None or not rates:
-            return fleet
-        if self._flown is None or self._flown[0] is not fleet or self._flown[1] != rates:
-            self._flown = fleet, rates, fleet_as_flown(fleet, rates)
-        return self._flown[2]
-
     def _fleet_now(self) -> Mission | None:
         """The mission without tasks and zones, made once per brief; None before the brief."""
         brief = self.replica.brief
         if brief is not None and brief is not self._brief:
             self._brief = brief
-            self._fleet = _mission(self._name, brief, map(_uav_of, brief.uavs), (), ())
+            self._fleet = mission_with(self._name, brief, fleet_of(brief), (), ())
         return self._fleet
 
     def _tasks_now(self) -> list[Task]:
@@ -245,13 +243,24 @@ class TaskBoard:
         return [self._tasks[entry.task][1] for entry in self._entries]
 
     def _sort(self) -> None:
-        if self._entries_version != self.replica.board_version:
-            self._entries = sorted(self.replica.board.values(), key=_order)
-            self._untried = {
-                entry.task: TaskState.WITHDRAWN if entry.withdrawn else TaskState.OPEN
-                for entry in self._entries
-            }
-            self._entries_version = self.replica.board_version
+        """Bring the entries up to date; most changes add one."""
+        board, version = self.replica.board, self.replica.board_version
+        if self._entries_version == version:
+            return
+        if self._has_only_grown(self._entries_version, len(self._entries)):
+            for entry in islice(reversed(board.values()), version - self._entries_version):
+                insort(self._entries, entry, key=board_order)
+        else:
+            self._entries = sorted(board.values(), key=board_order)
+        self._entries_version = version
+
+    def _has_only_grown(self, version: int, n_task: int) -> bool:
+        """Whether since that version of the board, with so many tasks, others have been added and
+        nothing else has changed: then they are the last ones of the replica's board.
+        """
+        # Each change adds at most one task, so as many tasks as changes are nothing but additions.
+        board, n_changes = self.replica.board, self.replica.board_version - version
+        return version >= 0 and len(board) - n_task == n_changes
 
     def _catch_up(self) -> None:
         """Work the states out of brief, board and outcomes, or add what has come at their end.
@@ -262,21 +271,44 @@ class TaskBoard:
         basis = replica.board_version, replica.reattempts
         if basis == self._basis and len(outcomes) == self._attempts:
             return
-        if basis != self._basis:
-            self._sort()
-            self._states, self._attempts = self._untried.copy(), 0
+        if basis != self._basis and not self._add_entries(basis):
+            self._states = {task: _untried(entry) for task, entry in replica.board.items()}
+            self._n_open = sum(state is TaskState.OPEN for state in self._states.values())
+            self._attempts, self._ended = 0, []
+            self.generation += 1
         final = replica.brief is None or not replica.brief.reattempt_failed
         states, further = self._states, len(outcomes) - self._attempts
-        for (_, task), outcome in islice(reversed(outcomes.items()), further):
-            if task not in states:
+        for (uav, task), outcome in islice(reversed(outcomes.items()), further):
+            before = states.get(task)
+            if before is None:
                 continue
+            insort(self._ended, (outcome.completed_s, replica.board[task].number, task, uav))
             if outcome.result is AttemptResult.DONE:
                 states[task] = TaskState.DONE
-            elif final and states[task] is TaskState.OPEN:
+            elif final and before is TaskState.OPEN:
                 states[task] = TaskState.FAILED
+            self._n_open -= before is TaskState.OPEN and states[task] is not TaskState.OPEN
         self._attempts = len(outcomes)
-        self._unfinished = TaskState.OPEN in self._states.values()
         self._basis = basis
+
+    def _add_entries(self, basis: tuple[int, int]) -> bool:
+        """Add the states of new tasks that nobody has told an outcome of; whether that is all."""
+        version, reattempts = self._basis or (-1, -1)
+        if reattempts != basis[1] or not self._has_only_grown(version, len(self._states)):
+            return False
+        board, outcomes = self.replica.board, self.replica.outcomes
+        new = list(islice(reversed(board.values()), basis[0] - version))
+        if any((uav, entry.task) in outcomes for entry in new for uav in self.replica.heads):
+            return False
+        for entry in reversed(new):
+            self._states[entry.task] = _untried(entry)
+            self._n_open += not entry.withdrawn
+        return True
+
+
+def _untried(entry: TaskEntry) -> TaskState:
+    """What the task is as long as nobody has attempted it."""
+    return TaskState.WITHDRAWN if entry.withdrawn else TaskState.OPEN
 
 
 def is_of_field(mission: Mission) -> bool:
@@ -286,69 +318,9 @@ def is_of_field(mission: Mission) -> bool:
 
 def mission_of(replica: Replica, name: str, brief: MissionConfig) -> Mission:
     """The mission as the board shows it now: all posted tasks, in board order, zones in force."""
-    entries = sorted(replica.board.values(), key=_order)
+    entries = sorted(replica.board.values(), key=board_order)
     zones = zones_in_force(replica) if replica.brief is brief else brief.zones
-    return _mission(name, brief, map(_uav_of, brief.uavs), map(task_of, entries), zones)
-
-
-def _mission(
-    name: str,
-    brief: MissionConfig,
-    uavs: Iterable[Uav],
-    tasks: Iterable[Task],
-    zones: Iterable[ZoneSpec],
-) -> Mission:
-    return Mission(
-        name=name,
-        horizon_s=brief.horizon_s,
-        uavs=tuple(uavs),
-        tasks=tuple(tasks),
-        success_default=brief.success_default,
-        survival_default=brief.survival_default,
-        reattempt_failed=brief.reattempt_failed,
-        origin=Origin(*brief.origin),
-        bases=tuple(base.base() for base in brief.bases),
-        zones=tuple(zone.zone() for zone in zones),
-        wind_enu_m_s=brief.wind_enu_m_s,
-        zone_margin_m=brief.zone_margin_m,
-        band_m=brief.band_m,
-    )
-
-
-def _uav_of(entry: UavSpec) -> Uav:
-    return Uav(
-        id=UavId(entry.id),
-        position_enu_m=entry.position_enu_m,
-        speed_m_s=entry.speed_m_s,
-        success=entry.success,
-        survival=entry.survival,
-        kind=entry.kind,
-        acceleration_m_s2=entry.acceleration_m_s2,
-        airspeed_m_s=entry.airspeed_m_s,
-        endurance_s=entry.endurance_s,
-        reserve_frac=entry.reserve_frac,
-        charge_frac=entry.charge_frac,
-    )
-
-
-def task_of(entry: PostedTask) -> Task:
-    """The task that ``entry`` tells of, as missions have it."""
-    return Task(
-        id=TaskId(entry.task),
-        position_enu_m=entry.position_enu_m,
-        value=entry.value,
-        service_s=entry.service_s,
-        kind=entry.kind,
-        due_s=entry.due_s,
-        opens_s=entry.opens_s,
-        closes_s=entry.closes_s,
-        path_enu_m=entry.path_enu_m,
-        height_m=entry.height_m,
-    )
-
-
-def _order(entry: TaskEntry) -> tuple[int, str]:
-    return entry.number, entry.task
+    return mission_with(name, brief, fleet_of(brief), map(task_of, entries), zones)
 
 
 RuleMaker = Callable[[str, Mapping[str, Sequence[str]]], Rule | None]
@@ -367,8 +339,9 @@ def rule_of(name: str, routes: Mapping[str, Sequence[str]]) -> Rule | None:
 
 def ranks(sequence: Sequence[str], uavs: Sequence[str]) -> dict[str, int]:
     """Rank of every UAV: place in the sequence; those not in it follow by id."""
-    listed = [uav for uav in sequence if uav in uavs]
-    return {uav: rank for rank, uav in enumerate([*listed, *sorted(set(uavs) - set(listed))])}
+    known = set(uavs)
+    listed = [uav for uav in sequence if uav in known]
+    return {uav: rank for rank, uav in enumerate([*listed, *sorted(known.difference(listed))])}
 
 
 def after_outcomes(problem: Problem, board: TaskBoard) -> TeamState:
@@ -378,27 +351,24 @@ def after_outcomes(problem: Problem, board: TaskBoard) -> TeamState:
     ``open`` is as on the board. All are active: who takes part is the caller's judgement.
     """
     state = TeamState.at_start(problem)
-    states = board.states
+    states, row_of, column_of = board.states, problem.row_of, problem.column_of
     state.open[:] = [states.get(task) is TaskState.OPEN for task in problem.task_ids]
-    rows: dict[str, int] = {uav: index for index, uav in enumerate(problem.uav_ids)}
-    columns: dict[str, int] = {task: index for index, task in enumerate(problem.task_ids)}
-    ended = sorted(
-        (outcome.completed_s, columns[task], rows[uav])
-        for (uav, task), outcome in board.replica.outcomes.items()
-        if uav in rows and task in columns
-    )
-    for completed_s, task, uav in ended:
-        _end_at(problem, state, uav, task, completed_s)
+    ended = [
+        (row_of[uav], column_of[task], completed_s)
+        for completed_s, _, task, uav in board.ended
+        if uav in row_of and task in column_of
+    ]
+    if ended:
+        rows, columns, completed_s = map(np.array, zip(*ended, strict=True))
+        state.free_s[rows] = completed_s  # of several the last one counts
+        state.place_enu_m[rows] = problem.task_enu_m[columns]
+        np.multiply.at(state.survived, rows, problem.survival[rows, columns])  # one by one
     return state
 
 
 def finish_claim(problem: Problem, state: TeamState, uav: int, task: int, claim: Claim) -> None:
     """Let ``uav`` end the ``task`` it claims: then it is free, there, and nobody else takes it."""
-    _end_at(problem, state, uav, task, claim.completion_s)
-    state.open[task] = False
-
-
-def _end_at(problem: Problem, state: TeamState, uav: int, task: int, completed_s: float) -> None:
-    state.free_s[uav] = completed_s
+    state.free_s[uav] = claim.completion_s
     state.place_enu_m[uav] = problem.task_enu_m[task]
     state.survived[uav] *= problem.survival[uav, task]
+    state.open[task] = False

@@ -73,6 +73,8 @@ class Replica:
         """By task id, what the operator says, orders for other flights among it."""
         self.claims: dict[str, Claim] = {}
         """By UAV id, of those in the brief; of all as long as there is none."""
+        self.claimants: dict[str, dict[str, Claim]] = {}
+        """By task id, those of these claims that are on it; none of it is empty."""
         self.outcomes: dict[tuple[str, str], Outcome] = {}
         """By UAV id and task id, of those in the brief likewise; as long as neither `board_version`
         nor `reattempts` grows, further ones come at the end."""
@@ -244,6 +246,7 @@ class Replica:
             self._fleet = {uav.id for uav in brief.uavs}
             self._forget_strangers()
             self.claims.clear()
+            self.claimants.clear()
             self.outcomes.clear()
             self.calibrations.clear()
             self.calibration_version += 1
@@ -269,7 +272,7 @@ class Replica:
         """What a UAV that takes part claims, or has done, or how it flies."""
         match message.body:
             case Claim() as claim:
-                self.claims[message.writer] = claim
+                self._note_claim(message.writer, claim)
             case Outcome(task=task) as outcome:
                 self.reattempts += (message.writer, task) in self.outcomes
                 self.outcomes[message.writer, task] = outcome
@@ -278,6 +281,16 @@ class Replica:
                 self.calibrations[message.writer] = calibration
             case _:
                 pass
+
+    def _note_claim(self, uav: str, claim: Claim) -> None:
+        before, self.claims[uav] = self.claims.get(uav), claim
+        if before is not None and before.task is not None:
+            rivals = self.claimants[before.task]
+            del rivals[uav]
+            if not rivals:
+                del self.claimants[before.task]
+        if claim.task is not None:
+            self.claimants.setdefault(claim.task, {})[uav] = claim
 
     def _settle(self, task: str) -> None:
         """Find out anew what counts of all that is said of ``task``."""
