@@ -68,6 +68,11 @@ class BoardArraysCache:
                 del self._newest[next(iter(self._newest))]
         return found
 
+    @property
+    def n_known(self) -> int:
+        """How many are in use, the newest included."""
+        return len(self._known)
+
 
 def _made(
     mission: str,

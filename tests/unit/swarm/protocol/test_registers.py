@@ -162,6 +162,31 @@ def test_of_equal_stamps_the_same_statement_stands_everywhere(order: list[Claim]
     assert encode(next(joined(said).messages())) == max(encode(each) for each in said)
 
 
+@given(
+    st.lists(
+        st.one_of(
+            st.tuples(st.sampled_from(["u0", "u1", "u2"]), st.sampled_from(["t0", "t1", None])),
+            st.lists(st.sampled_from(["u0", "u1", "u2"]), unique=True),
+        ),
+        max_size=20,
+    )
+)
+def test_claimants_are_the_claims_by_task(events: list[tuple[str, str | None] | list[str]]) -> None:
+    replica = Replica()
+    for counter, event in enumerate(events, 1):
+        if isinstance(event, list):
+            replica.join(message(COORDINATOR, brief(*map(uav, event)), counter))
+        else:
+            claim = IDLE if event[1] is None else held(event[1], 0.0)
+            replica.join(message(event[0], claim, counter))
+
+        by_task: dict[str, dict[str, Claim]] = {}
+        for name, each in replica.claims.items():
+            if each.task is not None:
+                by_task.setdefault(each.task, {})[name] = each
+        assert replica.claimants == by_task
+
+
 def test_a_new_life_of_a_writer_beats_any_count_of_the_old_one() -> None:
     old, new = message("u0", held("t0", 0.0), counter=999), message("u0", IDLE, 1, incarnation=2)
 
