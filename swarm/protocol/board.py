@@ -359,7 +359,8 @@ def after_outcomes(problem: Problem, board: TaskBoard) -> TeamState:
         if uav in row_of and task in column_of
     ]
     if ended:
-        rows, columns, completed_s = map(np.array, zip(*ended, strict=True))
+        rows, columns = (np.array([each[axis] for each in ended]) for axis in (0, 1))
+        completed_s = np.array([each[2] for each in ended])
         state.free_s[rows] = completed_s  # of several the last one counts
         state.place_enu_m[rows] = problem.task_enu_m[columns]
         np.multiply.at(state.survived, rows, problem.survival[rows, columns])  # one by one

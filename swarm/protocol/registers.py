@@ -59,6 +59,12 @@ class Replica:
         """Fingerprint of each register, as far as the digest has been asked for."""
         self._changed: set[str] = set()
         """Keys of registers that have changed since."""
+        self._changes = 0
+        """How often registers have changed."""
+        self._asked: tuple[int, str, frozenset[str]] | None = None
+        """When, and what for, it was last asked for `answers`..."""
+        self._answered: tuple[Message, ...] = ()
+        """...and those."""
         self.heads: dict[str, Stamp] = {}
         """By writer, of its newest statement that is known."""
         self.brief: MissionConfig | None = None
@@ -121,12 +127,14 @@ class Replica:
             if _says_more(message, known):
                 self._registers[key] = message
                 self._changed.add(key)
+                self._changes += 1
             return False
         if known is None and not self._has_room(message):
             self.overfull += 1
             return False
         self._registers[key] = message
         self._changed.add(key)
+        self._changes += 1
         head = self.heads.get(message.writer)
         if head is None or message.stamp > head:
             self.heads[message.writer] = message.stamp
@@ -199,6 +207,7 @@ class Replica:
         writers = set[str]()
         for key in strange[MOST_STRANGE:]:
             message = self._registers.pop(key)
+            self._changes += 1
             writers.add(message.writer)
             self._changed.discard(key)
             number = self._in_digest.pop(key, 0)
@@ -325,6 +334,7 @@ class Replica:
         for _, message in words:
             self._registers[message.key] = message
             self._changed.add(message.key)
+            self._changes += 1
             match message.body:
                 case PlanEpoch():
                     self.epoch_stamp = message.stamp
@@ -344,26 +354,26 @@ class Replica:
             if wanted is None or message.writer in wanted:
                 yield message
 
-    def answers(self, own: str, steady: Collection[str]) -> Iterator[Message]:
+    def answers(self, own: str, steady: Collection[str]) -> tuple[Message, ...]:
         """What ``own`` answers for, in key order.
 
         That is its own registers and those of all who may not remember them: who is not
         steady, and of everyone what an earlier life has said, which the present one may
-        not have found yet.
-
         not have found yet. ``steady`` are the writers that are there and remember all they ever
-        said.
+        said. When somebody is lost everybody asks, so the last answer is kept until it changes.
         """
-        heads = self.heads
-        answered = [
-            (key, message)
-            for key, message in self._registers.items()
-            if (writer := message.writer) == own
-            or writer not in steady
-            or message.stamp.incarnation < heads[writer].incarnation
-        ]
-        for _, message in sorted(answered):
-            yield message
+        asked = self._changes, own, frozenset(steady)
+        if self._asked != asked:
+            heads = self.heads
+            answered = [
+                (key, message)
+                for key, message in self._registers.items()
+                if (writer := message.writer) == own
+                or writer not in steady
+                or message.stamp.incarnation < heads[writer].incarnation
+            ]
+            self._asked, self._answered = asked, tuple(message for _, message in sorted(answered))
+        return self._answered
 
     def digest(self) -> dict[str, int]:
         """Writer -> a number that is equal wherever all its registers are."""

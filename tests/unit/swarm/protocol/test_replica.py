@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from random import Random
 
+import pytest
 from hypothesis import given
 
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
@@ -311,3 +313,24 @@ def test_made_up_tasks_take_a_bounded_room() -> None:
     assert (len(replica.board), replica.overfull) == (MOST_TASKS, 7)
     assert not replica.join(message(OPERATOR, order("op")))
     assert replica.join(message(COORDINATOR, entry("t0", withdrawn=True), MOST_TASKS + 9))
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_an_answer_that_was_kept_is_what_would_be_answered_anew(seed: int) -> None:
+    random, said, replica = Random(seed), list[Message](), Replica()
+    writers = ["u0", "u1", "u2"]
+    for counter in range(1, 60):
+        if random.random() < 0.4:
+            word = message(
+                random.choice(writers),
+                random.choice([held("t0", 2.0), done("t0"), done("t1"), IDLE]),
+                counter,
+                incarnation=random.randint(1, 2),
+            )
+            said.append(word)
+            replica.join(word)
+        fresh = Replica()
+        fresh.join_all(said)
+        own, steady = random.choice(writers), set(random.sample(writers, 2))
+        assert replica.answers(own, steady) == fresh.answers(own, steady)
+        assert replica.answers(own, steady) == fresh.answers(own, steady)
