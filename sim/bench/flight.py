@@ -125,7 +125,7 @@ class FlightBench(BenchResult):
         )
 
 
-class _TimedAgent(AgentCore):
+class _MeasuredAgent(AgentCore):
     """An agent that notes what its steps take, apart from the others."""
 
     def __init__(
@@ -212,7 +212,7 @@ def measure_flight(
         method=METHOD,
         seed=fate.seed,
         coordinator_lost_s=None if coordinator else 0.0,
-        make_agent=partial(_TimedAgent, decided_s=decided_s, heard_s=heard_s),
+        make_agent=partial(_MeasuredAgent, decided_s=decided_s, heard_s=heard_s),
         replan=_timed(planned_anew, replanned_s, progress),
     )
     leader = flown.world.processes[COORDINATOR]

@@ -98,6 +98,17 @@ def test_missions_tells_people_what_was_flown(capsys: pytest.CaptureFixture[str]
     assert said.err == ""
 
 
+def test_one_flight_is_told_in_words(capsys: pytest.CaptureFixture[str]) -> None:
+    asked = ("flight", "--size", "3x12", "--seed", "4", "--loss", "0", "--no-coordinator")
+
+    assert swarm(*asked) == 0
+
+    told = " ".join(capsys.readouterr().out.split())
+    assert "3 UAVs × 12 tasks, seed 4, loss 0, pop-ups 0.3; its coordinator is dead." in told
+    assert "12 done, 0 missed" in told
+    assert "an agent decides" in told
+
+
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
@@ -116,6 +127,7 @@ def test_missions_tells_people_what_was_flown(capsys: pytest.CaptureFixture[str]
         (("plan", "no-such-scenario"), "no-such-scenario"),
         (("decide", "--size", "ten"), "--size: ten: no size"),
         (("missions", "--size", "ten"), "--size: ten: no size"),
+        (("flight", "--size", "ten"), "--size: ten: no size"),
         ((), "swarm bench: missing command"),
     ],
 )
