@@ -70,8 +70,8 @@ class FlightBench(BenchResult):
     seed: int
     loss: float
     popup: float
-    coordinator: bool
-    """Whether it lived, and planned anew."""
+    replan_interval_s: float | None
+    """Shortest time between two re-plans [s mission time]; None: the coordinator is dead."""
     value: float
     """Of what was flown [value·s]."""
     undisturbed: float
@@ -98,7 +98,9 @@ class FlightBench(BenchResult):
 
     def parts(self) -> Iterable[RenderableType]:
         """See `BenchResult`."""
-        how = "its coordinator plans anew" if self.coordinator else "its coordinator is dead"
+        how = "its coordinator is dead"
+        if self.replan_interval_s is not None:
+            how = f"its coordinator plans anew every {self.replan_interval_s:g} s at the most"
         yield (
             f"Flown in virtual time: {self.n_uav} UAVs × {self.n_task} tasks, seed {self.seed}, "
             f"loss {self.loss:g}, pop-ups {self.popup:g}; {how}."
@@ -177,7 +179,7 @@ def measure_flight(
     uncertainty: Uncertainty,
     clock: Clock,
     *,
-    coordinator: bool = True,
+    replan_interval_s: float | None,
     progress: Progress = unheard,
 ) -> FlightBench:
     """Fly the first trial of a study of that seed, timed.
@@ -188,7 +190,8 @@ def measure_flight(
         seed: of mission, planner and realization.
         uncertainty: what may happen.
         clock: the machine's.
-        coordinator: whether it lives; else it dies as the mission begins.
+        replan_interval_s: shortest time between two re-plans [s mission time]; None: the
+            coordinator dies as the mission begins.
         progress: told what is being done.
     """
     mission = RandomMissions(n_uav, n_task).of_trial(seed, 0)
@@ -202,18 +205,16 @@ def measure_flight(
     progress("plan of what is known at the start")
     planner = plan_once(planned)
     planner(fate.mission, METHOD, fate.seed)
-    decided_s: list[float] = []
-    heard_s: list[float] = []
-    led_s: list[float] = []
-    replanned_s: list[float] = []
+    decided_s, heard_s, led_s, replanned_s = (list[float]() for _ in range(4))
     flown = StochasticWorld(
         fate,
         planner,
         method=METHOD,
         seed=fate.seed,
-        coordinator_lost_s=None if coordinator else 0.0,
+        coordinator_lost_s=0.0 if replan_interval_s is None else None,
         make_agent=partial(_MeasuredAgent, decided_s=decided_s, heard_s=heard_s),
         replan=_timed(planned_anew, replanned_s, progress),
+        replan_interval_s=replan_interval_s,
     )
     leader = flown.world.processes[COORDINATOR]
     leader.core = _TimedCore(leader.core, led_s)
@@ -229,7 +230,7 @@ def measure_flight(
         seed=seed,
         loss=uncertainty.loss,
         popup=uncertainty.popup,
-        coordinator=coordinator,
+        replan_interval_s=replan_interval_s,
         value=scored.value,
         undisturbed=undisturbed,
         done=scored.done,

@@ -282,6 +282,16 @@ def flight(
             help="Whether the coordinator lives and plans anew; else it dies at the start.",
         ),
     ] = True,
+    replan_interval_s: Annotated[
+        float,
+        typer.Option(
+            "--replan-interval-s",
+            min=1.0,
+            max=1e6,
+            metavar="S",
+            help="Shortest mission time between two re-plans; real coordinators have 5.",
+        ),
+    ] = 60.0,
     seed: SeedOption = 0,
     json: JsonOption = False,
 ) -> int:
@@ -289,7 +299,9 @@ def flight(
 
     The real cores of all agents and of the coordinator fly it in one process, on an ideal bus.
     Unless --loss and --popup say otherwise, 30% of the UAVs are lost and 30% of the tasks pop
-    up. Times are processor time; all else follows from the seed.
+    up. Times are processor time; all else follows from the seed. At 200x5000 a re-plan takes
+    some seconds, and a mission three quarters of an hour: with an interval of 5 s most of the
+    work would be re-plans.
 
     Examples:
         swarm bench flight
@@ -311,7 +323,7 @@ def flight(
             seed,
             uncertainty,
             SystemClock(),
-            coordinator=coordinator,
+            replan_interval_s=replan_interval_s if coordinator else None,
             progress=tell,
         )
     show(done, json=json)

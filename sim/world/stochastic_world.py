@@ -79,7 +79,8 @@ class StochasticWorld:
 
     The coordinator dies at the mission time ``coordinator_lost_s``, unless that is None. A UAV that
     is lost on a slot of a base is carried away after ``clears_slots_s``, as an operator tells all
-    then; with None it stands there for good. See `World` for the others.
+    then; with None it stands there for good. The coordinator plans anew at least
+    ``replan_interval_s`` after it last did, by default as real ones do. See `World` for the others.
     """
 
     def __init__(
@@ -94,6 +95,7 @@ class StochasticWorld:
         make_observer: ObserverMaker | None = None,
         clears_slots_s: float | None = None,
         replan: Replanner = planned_anew,
+        replan_interval_s: float | None = None,
     ) -> None:
         self.fate = fate
         self._clears_slots_s = clears_slots_s
@@ -111,6 +113,8 @@ class StochasticWorld:
         if make_observer is not None and fate.uncertainty.ideal_communication:
             # There nobody's decision hangs on it, and nothing is drawn for each message.
             self._timing = replace(self._timing, status_s=_WATCHED_STATUS_S)
+        if replan_interval_s is not None:
+            self._timing = replace(self._timing, replan_interval_s=replan_interval_s)
         timing = self._timing
         self._outcomes: set[tuple[str, str, int]] = set()
         self._begun = False

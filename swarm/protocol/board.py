@@ -171,7 +171,7 @@ class TaskBoard:
         if self._arrays_version != version:
             self._sort()
             brief = self.replica.brief
-            self._arrays = None  # the newest of this process are kept elsewhere
+            self._arrays = None
             if brief is not None:
                 self._arrays = BOARD_ARRAYS.of(self._name, brief, self._entries, self.rates)
             self._arrays_version = version
@@ -271,6 +271,9 @@ class TaskBoard:
         basis = replica.board_version, replica.reattempts
         if basis == self._basis and len(outcomes) == self._attempts:
             return
+        if self._arrays_version[0] != basis[0]:
+            # The newest of this process are kept elsewhere; others need not wait to be forgotten.
+            self._arrays, self._arrays_version = None, (-1, -1)
         if basis != self._basis and not self._add_entries(basis):
             self._states = {task: _untried(entry) for task, entry in replica.board.items()}
             self._n_open = sum(state is TaskState.OPEN for state in self._states.values())

@@ -13,7 +13,8 @@ from swarm.runtime.clock import SystemClock
 
 def flown(*, loss: float = 0.3, coordinator: bool = True) -> FlightBench:
     uncertainty = Uncertainty(loss=loss, popup=loss)
-    return measure_flight(4, 24, 1, uncertainty, SystemClock(), coordinator=coordinator)
+    interval_s = 5.0 if coordinator else None
+    return measure_flight(4, 24, 1, uncertainty, SystemClock(), replan_interval_s=interval_s)
 
 
 def test_without_losses_and_pop_ups_the_plan_is_flown_and_nothing_is_planned_anew() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 from dataclasses import replace
 from random import Random
+from weakref import ref
 
 import numpy as np
 import pytest
@@ -69,6 +70,21 @@ def test_arrays_made_from_earlier_ones_are_those_made_anew(seed: int) -> None:
             found = board.problem
             assert found is not None
             assert_same(found, Problem.from_mission(mission_of(board.replica, MISSION, told)))
+
+
+def test_a_board_lets_go_of_arrays_that_are_old() -> None:
+    board = board_of(message(COORDINATOR, brief(*FLEET), 1), message(COORDINATOR, entry("t0"), 2))
+    first = board.problem
+    assert first is not None
+    old = ref(first)
+    del first
+    other = board_of(*board.replica.messages(), message(COORDINATOR, entry("t1", number=1), 3))
+    assert other.problem is not None  # the newest of this process
+
+    board.replica.join(message(COORDINATOR, entry("t2", number=2), 3))
+    assert board.unfinished
+    gc.collect()
+    assert old() is None
 
 
 def test_arrays_that_nobody_uses_are_given_back() -> None:

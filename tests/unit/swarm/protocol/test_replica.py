@@ -10,6 +10,7 @@ from hypothesis import given
 
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.protocol.messages import (
+    Body,
     CommandKind,
     Message,
     MissionConfig,
@@ -319,11 +320,12 @@ def test_made_up_tasks_take_a_bounded_room() -> None:
 def test_an_answer_that_was_kept_is_what_would_be_answered_anew(seed: int) -> None:
     random, said, replica = Random(seed), list[Message](), Replica()
     writers = ["u0", "u1", "u2"]
+    bodies: list[Body] = [held("t0", 2.0), done("t0"), done("t1"), IDLE]
     for counter in range(1, 60):
         if random.random() < 0.4:
             word = message(
                 random.choice(writers),
-                random.choice([held("t0", 2.0), done("t0"), done("t1"), IDLE]),
+                random.choice(bodies),
                 counter,
                 incarnation=random.randint(1, 2),
             )
