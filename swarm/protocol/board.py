@@ -111,10 +111,11 @@ class TaskBoard:
         self._brief: MissionConfig | None = None
         self._fleet: Mission | None = None
         """The mission of that brief, without tasks and zones."""
+        self._fleet_in_field = False
         self._tasks: dict[str, tuple[TaskEntry, Task]] = {}
         """By id, with the entry each was made from."""
-        self._limited: set[str] = set()
-        """Of these, tasks that a plain problem does not tell all of."""
+        self._limited = False
+        """Whether a plain problem does not tell all of some task."""
         self._mission: Mission | None = None
         self._mission_version = -1
         self._field_briefed: field.FieldProblem | None = None
@@ -211,12 +212,11 @@ class TaskBoard:
         return self._rates
 
     def _field_problem_now(self) -> field.FieldProblem | None:
-        fleet, tasks = self._fleet_now(), self._tasks_now()
+        self._sort()
         brief = self.replica.brief
-        if fleet is None or brief is None:
+        if self._fleet_now() is None or brief is None:
             return None
-        limited = not self._limited.isdisjoint(task.id for task in tasks)
-        if not (limited or zones_in_force(self.replica) or is_of_field(fleet)):
+        if not (self._limited or self._fleet_in_field or zones_in_force(self.replica)):
             return None
         mission = self.mission
         layers_m = [uav.layer_m for uav in brief.uavs]
@@ -227,7 +227,8 @@ class TaskBoard:
         brief = self.replica.brief
         if brief is not None and brief is not self._brief:
             self._brief = brief
-            self._fleet = mission_with(self._name, brief, fleet_of(brief), (), ())
+            self._fleet = BOARD_ARRAYS.fleet(self._name, brief)
+            self._fleet_in_field = is_of_field(self._fleet)
         return self._fleet
 
     def _tasks_now(self) -> list[Task]:
@@ -236,10 +237,6 @@ class TaskBoard:
         for entry in self._entries:
             if (known := self._tasks.get(entry.task)) is None or known[0] is not entry:
                 self._tasks[entry.task] = entry, task_of(entry)
-                limited = any(
-                    getattr(entry, name) != default for name, default in _UNLIMITED.items()
-                )
-                (self._limited.add if limited else self._limited.discard)(entry.task)
         return [self._tasks[entry.task][1] for entry in self._entries]
 
     def _sort(self) -> None:
@@ -250,8 +247,10 @@ class TaskBoard:
         if self._has_only_grown(self._entries_version, len(self._entries)):
             for entry in islice(reversed(board.values()), version - self._entries_version):
                 insort(self._entries, entry, key=board_order)
+                self._limited |= _is_limited(entry)
         else:
             self._entries = sorted(board.values(), key=board_order)
+            self._limited = any(map(_is_limited, self._entries))
         self._entries_version = version
 
     def _has_only_grown(self, version: int, n_task: int) -> bool:
@@ -307,6 +306,11 @@ class TaskBoard:
             self._states[entry.task] = _untried(entry)
             self._n_open += not entry.withdrawn
         return True
+
+
+def _is_limited(entry: TaskEntry) -> bool:
+    """Whether a plain problem does not tell all of the task."""
+    return any(getattr(entry, name) != default for name, default in _UNLIMITED.items())
 
 
 def _untried(entry: TaskEntry) -> TaskState:

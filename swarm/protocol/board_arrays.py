@@ -47,6 +47,17 @@ class BoardArraysCache:
         self._known: WeakValueDictionary[object, BoardArrays] = WeakValueDictionary()
         self._newest: dict[object, BoardArrays] = {}
         """By brief and rates, the one used last at the end."""
+        self._fleets: dict[object, tuple[MissionConfig, Mission]] = {}
+        """By brief, the last few, with what they are known by."""
+
+    def fleet(self, mission: str, brief: MissionConfig) -> Mission:
+        """UAVs of ``brief`` as it tells of them, without tasks and zones."""
+        key = mission, id(brief)
+        if key not in self._fleets:
+            if len(self._fleets) == _FLEETS_KEPT:
+                del self._fleets[next(iter(self._fleets))]
+            self._fleets[key] = brief, mission_with(mission, brief, fleet_of(brief), (), ())
+        return self._fleets[key][1]
 
     def of(
         self,
@@ -62,7 +73,7 @@ class BoardArraysCache:
         found = self._known.get(key)
         if found is None:
             before = self._newest.pop(by_fleet, None)
-            found = _made(mission, brief, entries, rates, before)
+            found = _made(self.fleet(mission, brief), brief, entries, rates, before)
             self._known[key] = self._newest[by_fleet] = found
             if len(self._newest) > _FLEETS_KEPT:
                 del self._newest[next(iter(self._newest))]
@@ -75,7 +86,7 @@ class BoardArraysCache:
 
 
 def _made(
-    mission: str,
+    briefed: Mission,
     brief: MissionConfig,
     entries: Sequence[TaskEntry],
     rates: Mapping[str, FlightRates],
@@ -83,7 +94,7 @@ def _made(
 ) -> BoardArrays:
     """Arrays of `BoardArraysCache.of`, made from others of that fleet ``before`` if there are."""
     if before is None:
-        fleet = fleet_as_flown(mission_with(mission, brief, fleet_of(brief), (), ()), rates)
+        fleet = fleet_as_flown(briefed, rates)
         tasks = tuple(map(task_of, entries))
         problem = Problem.from_mission(fleet, tasks=tasks)
         return BoardArrays(brief, tuple(entries), dict(rates), fleet, tasks, problem)
