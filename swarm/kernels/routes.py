@@ -248,7 +248,7 @@ def flat_lists(
     flat = np.array([task for route in lists for task in route], dtype=np.int64)
     if len(flat) and (flat.min() < 0 or flat.max() >= n_task):
         raise ValueError(f"lists name a task outside 0..{n_task - 1}")
-    if len(np.unique(flat)) != len(flat):
+    if len(flat) and np.bincount(flat).max() > 1:
         raise ValueError("lists name a task twice")
     offsets = np.zeros(n_uav + 1, dtype=np.int64)
     np.cumsum([len(route) for route in lists], out=offsets[1:])
