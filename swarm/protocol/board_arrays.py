@@ -17,7 +17,7 @@ from swarm.protocol.calibration import FlightRates, fleet_as_flown
 from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import MissionConfig, PostedTask, TaskEntry, UavSpec
 
-_FLEETS_KEPT = 4
+_FLEETS_KEPT = 2
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
