@@ -18,7 +18,7 @@ from swarm.allocation.lower_level import Decision, TeamState
 from swarm.allocation.problem import BoolArray, IntArray, Problem
 from swarm.kernels.lower_level import GREEDY, LOOKAHEAD, RuleCode, decide, valued
 from swarm.kernels.rollout import GuidedChoice, guided_choice
-from swarm.kernels.routes import Routes, TeamArrays
+from swarm.kernels.routes import ListArrays, TeamArrays
 
 _CODES: dict[str, RuleCode] = {"greedy": GREEDY, "lookahead": LOOKAHEAD}
 
@@ -103,7 +103,7 @@ class GuidedRule:
         self._repair_iterations = repair_iterations
         self._known_of: ReferenceType[Problem] | None = None
         """The problem asked about last; not kept from being forgotten by all others."""
-        self._routes: Routes = []
+        self._routes = ListArrays.of([], 0, 0)
         self._owner: IntArray = np.zeros(0, dtype=np.int64)
         self._lacks_some = False
         """Whether some task that somebody can do is on no list."""
@@ -153,13 +153,13 @@ class GuidedRule:
             return
         self._known_of = ref(problem)
         index = problem.column_of
-        self._routes = [
+        routes = [
             [index[task] for task in self._lists.get(uav, ()) if task in index]
             for uav in problem.uav_ids
         ]
+        self._routes = ListArrays.of(routes, problem.n_uav, problem.n_task)
         self._owner = np.full(problem.n_task, -1, dtype=np.int64)
-        for uav_index, route in enumerate(self._routes):
-            self._owner[route] = uav_index
+        self._owner[self._routes.task] = self._routes.uav
         self._lacks_some = bool((problem.capable.any(axis=0) & (self._owner < 0)).any())
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarm.kernels import _kernels
-from swarm.kernels.routes import TeamArrays, open_lists
+from swarm.kernels.routes import ListArrays, TeamArrays, open_lists
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,11 @@ class GuidedChoice:
 
 
 def guided_choice(
-    team: TeamArrays, lists: Sequence[Sequence[int]], uav: int, *, iterations: int = 0
+    team: TeamArrays,
+    lists: Sequence[Sequence[int]] | ListArrays,
+    uav: int,
+    *,
+    iterations: int = 0,
 ) -> GuidedChoice:
     """Compare the planned task with the ten best by p·m / (travel + service).
 

@@ -261,19 +261,40 @@ def lists_of(flat: npt.NDArray[np.int64], offsets: npt.NDArray[np.int64]) -> Rou
     return [tasks[begin:end] for begin, end in pairwise(ends)]
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class ListArrays:
+    """Lists end to end, for who continues from the same ones again and again."""
+
+    task: npt.NDArray[np.int64]
+    """(n,) of each entry."""
+    uav: npt.NDArray[np.int64]
+    """(n,) on whose list it is; ascending."""
+
+    @classmethod
+    def of(cls, lists: Sequence[Sequence[int]], n_uav: int, n_task: int) -> ListArrays:
+        """The same lists.
+
+        Raises:
+            ValueError: a list too many or too few, an unknown task, or one task twice.
+        """
+        flat, offsets = flat_lists(lists, n_uav, n_task)
+        return cls(flat, np.repeat(np.arange(n_uav), np.diff(offsets)))
+
+
 def open_lists(
-    team: TeamArrays, lists: Sequence[Sequence[int]] | None
+    team: TeamArrays, lists: Sequence[Sequence[int]] | ListArrays | None
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
     """The lists without what is closed, beyond the UAV or on the list of an inactive UAV."""
     problem = team.problem
     if lists is None:
         return flat_lists([[]] * problem.n_uav, problem.n_uav, problem.n_task)
-    flat, offsets = flat_lists(lists, problem.n_uav, problem.n_task)
-    uav = np.repeat(np.arange(problem.n_uav), np.diff(offsets))
-    keep = np.asarray(team.open)[flat] & np.asarray(team.active)[uav] & problem.capable[uav, flat]
-    kept_offsets = np.zeros_like(offsets)
+    if not isinstance(lists, ListArrays):
+        lists = ListArrays.of(lists, problem.n_uav, problem.n_task)
+    task, uav = lists.task, lists.uav
+    keep = np.asarray(team.open)[task] & np.asarray(team.active)[uav] & problem.capable[uav, task]
+    kept_offsets = np.zeros(problem.n_uav + 1, dtype=np.int64)
     np.cumsum(np.bincount(uav[keep], minlength=problem.n_uav), out=kept_offsets[1:])
-    return flat[keep], kept_offsets
+    return task[keep], kept_offsets
 
 
 def _floats(name: str, value: npt.ArrayLike, shape: tuple[int, ...]) -> FloatArray:
