@@ -24,14 +24,13 @@ Tails::Tails(const Offer& offer, Watch& watch)
     bool any = false;
     for (int i = 0; i < n; ++i) {
       for (const Line& line : fresh[i]) {
-        const Span span = useful(i, line, {offer_.first_s[i], offer_.latest_s[i]});
-        if (!span.empty() && extend(i, line, span, watch)) any = true;
+        if (extend(i, line, watch)) any = true;
         if (overflown_ || watch.stopped()) return;
       }
     }
     if (!any) return;
     for (int i = 0; i < n; ++i)
-      if (!coming_[i].empty()) tidy(i);
+      if (!coming_[i].empty()) tidy(i, watch);
   }
 }
 
@@ -78,11 +77,16 @@ Tails::Span Tails::useful(int i, const Line& line, Span span, bool sort) {
   return span;
 }
 
-bool Tails::extend(int i, const Line& line, Span span, Watch& watch) {
+bool Tails::extend(int i, const Line& line, Watch& watch) {
+  std::int64_t steps = steps_among(i);
+  const Span span = useful(i, line, {offer_.first_s[i], offer_.latest_s[i]});
+  if (span.empty()) {
+    watch.stops_after(steps);
+    return false;
+  }
   // From a / w on it is worth nothing, and the task before it does better as the last one.
   const double until_s = std::min(span.until_s, line.a / line.w);
   bool any = false;
-  std::int64_t steps = 1;
   for (const Offer::Arc* arc = offer_.arcs_begin(i); arc != offer_.arcs_end(i); ++arc) {
     if (arc->reach_s >= until_s) break;
     const int h = arc->from;
@@ -94,7 +98,7 @@ bool Tails::extend(int i, const Line& line, Span span, Watch& watch) {
     const Line longer{line.a - line.w * leg_s + w * offer_.left_s - offer_.price[h], line.w + w,
                       offer_.moved(line.known, i, h, offer_.tail_memory(h)),
                       static_cast<int>(nodes_.size())};
-    steps += static_cast<std::int64_t>(lines_[h].size()) / 4 + 2;
+    steps += steps_among(h);
     if (useful(h, longer, own).empty()) continue;
     nodes_.push_back({h, line.born});
     if (nodes_.size() > kMostBorn) overflown_ = true;
@@ -107,11 +111,12 @@ bool Tails::extend(int i, const Line& line, Span span, Watch& watch) {
 }
 
 // Drops lines that others have overtaken.
-void Tails::tidy(int i) {
+void Tails::tidy(int i, Watch& watch) {
   std::vector<Line>& lines = lines_[i];
   const int oldest_coming = coming_[i].front().born;
   coming_[i].clear();
   for (std::size_t k = 0; k < lines.size();) {
+    if (watch.stops_after(steps_among(i))) return;
     if (useful(i, lines[k], {offer_.first_s[i], offer_.latest_s[i]}, false).empty()) {
       lines.erase(lines.begin() + static_cast<std::ptrdiff_t>(k));
       continue;

@@ -15,6 +15,7 @@ namespace peckorder {
 
 class Tails {
  public:
+  // Where the watch has stopped it, nothing here says anything.
   Tails(const Offer& offer, Watch& watch);
 
   // Too many of them: then nothing here says anything.
@@ -50,8 +51,12 @@ class Tails {
   // The times of `span` at which no other line of the task is as good. With `sort`
   // who outdoes the line moves towards the front, where the next one meets it sooner.
   Span useful(int i, const Line& line, Span span, bool sort = true);
-  bool extend(int i, const Line& line, Span span, Watch& watch);
-  void tidy(int i);
+  bool extend(int i, const Line& line, Watch& watch);
+  void tidy(int i, Watch& watch);
+  // What it takes to hold one line against all of a task.
+  std::int64_t steps_among(int i) const {
+    return static_cast<std::int64_t>(lines_[i].size()) / 4 + 2;
+  }
 
   const Offer& offer_;
   std::vector<std::vector<Line>> lines_;   // per first task

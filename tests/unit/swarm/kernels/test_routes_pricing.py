@@ -97,13 +97,17 @@ def test_cut_short_it_still_bounds_all_lists(seed: int, heads: int) -> None:
     assert found.lists[1] == []
 
 
+def in_one_place(n_task: int, price_frac: float) -> tuple[Problem, FloatArray]:
+    """Tasks that cost so much of what they are worth to who is there at once."""
+    apart = random_mission(2, n_task, 0)
+    places_m = np.tile(apart.task_enu_m[0], (n_task, 1))
+    problem = replace(apart, task_enu_m=places_m, service_s=np.zeros(n_task))
+    return problem, price_frac * problem.weight.mean(axis=0) * problem.horizon_s
+
+
 def test_sixty_tasks_in_one_place_are_bounded_by_what_all_of_them_earn() -> None:
-    apart = random_mission(2, 60, 0)
-    problem = replace(
-        apart, task_enu_m=np.tile(apart.task_enu_m[0], (60, 1)), service_s=np.zeros(60)
-    )
+    problem, price = in_one_place(60, 0.5)
     team = team_at_start(problem)
-    price = 0.5 * problem.weight.mean(axis=0) * problem.horizon_s
 
     found = price_lists(team, price, heads=100)
 
@@ -163,6 +167,20 @@ def test_threads_change_no_bit() -> None:
     assert one.lists == three.lists
     assert one.bound.tobytes() == three.bound.tobytes()
     assert one.worth.tobytes() == three.worth.tobytes()
+
+
+def test_it_asks_all_the_while_that_tails_in_one_place_are_held_against_each_other() -> None:
+    """Some 25 ms of work, nearly all of it for tails, between which 10 ms went by unasked."""
+    problem, price = in_one_place(24, 0.9)
+    asked = []
+
+    def goes_on() -> bool:
+        asked.append(0)
+        return False
+
+    team = team_at_start(problem)
+    assert price_lists(team, price, heads=1, threads=1, should_stop=goes_on) is not None
+    assert len(asked) >= 20
 
 
 def test_told_to_give_up_there_is_no_answer() -> None:
