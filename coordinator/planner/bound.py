@@ -83,6 +83,26 @@ class UpperBound:
     """Better ones than were known, where they were met while the optimum was proven."""
 
 
+@dataclass(slots=True)
+class LowestBound:
+    """The least bound found so far."""
+
+    objective: float
+    """[value·s]."""
+    rounding_frac: float
+    """Of a bound, by how much sums in another order may come out lower."""
+    tell: Callable[[float], None] | None = None
+    """Told each lower bound when it is found [value·s]."""
+
+    def note(self, bound: float) -> None:
+        """Keep what was found [value·s] if it is lower, and tell of it."""
+        bound += self.rounding_frac * abs(bound)
+        if bound < self.objective:
+            self.objective = bound
+            if self.tell is not None:
+                self.tell(bound)
+
+
 def meets(bound: float, objective: float) -> bool:
     """Whether no lists are better, but for rounding."""
     return bound <= objective + _MET * abs(objective)
@@ -145,16 +165,7 @@ def upper_bound(
     def stops() -> bool:
         return should_stop(0.0)
 
-    lowest = trivial
-
-    def note(bound: float) -> None:
-        nonlocal lowest
-        bound += _ROUNDING * abs(bound)
-        if bound < lowest:
-            lowest = bound
-            if progress is not None:
-                progress(bound)
-
+    lowest = LowestBound(trivial, _ROUNDING, progress)
     known = _Known.of(problem, lists)
     price, bundle = known.price, known.bundle(problem.n_uav)
     price = _approached(team, price, bundle, beginning_of(should_stop, _ROUGH_FRAC), threads)
@@ -172,7 +183,7 @@ def upper_bound(
         enough=known.worth,
         first_step=_LAST_ROUGH_STEP,
         should_stop=should_stop,
-        progress=note,
+        progress=lowest.note,
     )
     better: tuple[tuple[int, ...], ...] | None = None
     if relaxed.settled and team.problem.certain and relaxed.bound > known.worth:
@@ -186,8 +197,8 @@ def upper_bound(
             should_stop=stops,
         )
         closed, better = closed_bound(worthy, relaxed, known.worth, stops)
-        note(closed)
-    return UpperBound(lowest, relaxed.rounds, better)
+        lowest.note(closed)
+    return UpperBound(lowest.objective, relaxed.rounds, better)
 
 
 def lagrangian_bound(

@@ -20,11 +20,12 @@ wind let a way over a third place be quicker than the straight one.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from coordinator.planner.bound import lagrangian_bound
+from coordinator.planner.bound import LowestBound, lagrangian_bound
 from coordinator.planner.options import ShouldStop, never
 from swarm.allocation.field.problem import BoolArray, FieldProblem, FloatArray
 from swarm.kernels._kernels import KernelProblem
@@ -62,6 +63,7 @@ def field_bound(
     known: float = 0.0,
     price: FloatArray | None = None,
     threads: int | None = None,
+    progress: Callable[[float], None] | None = None,
 ) -> FieldBound:
     """The better of the trivial and the Lagrangian bound.
 
@@ -72,6 +74,7 @@ def field_bound(
         known: J of lists that are known [value·s].
         price: (n_task,) what each task adds to them, roughly [value·s]; nothing when None.
         threads: at most this many; does not change the result.
+        progress: told each lower bound on J when it is found [value·s].
     """
     reach = _Reach(problem)
     possible = reach.possible.any(axis=0)
@@ -79,10 +82,10 @@ def field_bound(
     left_s = np.where(reach.possible, problem.until_s - reach.earliest_s, 0.0)
     best = (problem.weight * left_s).max(axis=0, initial=0.0)
     trivial = float(best.sum()) * (1.0 + _ROUNDING)
-    lowest = trivial
+    lowest = LowestBound(trivial, _ROUNDING, progress)
     if _affordable(problem)[1] >= _FEWEST_ROUNDS and trivial > 0.0 and not should_stop(0.0):
-        lowest = _lagrangian(problem, reach, should_stop, known, price, threads)
-    return FieldBound(left_out, min(lowest, trivial))
+        _lower_by_prices(lowest, problem, reach, should_stop, known, price, threads)
+    return FieldBound(left_out, lowest.objective)
 
 
 def _affordable(problem: FieldProblem) -> tuple[int, int]:
@@ -180,14 +183,16 @@ def _closed_legs_s(problem: FieldProblem) -> FloatArray:
     return legs_s
 
 
-def _lagrangian(
+def _lower_by_prices(
+    lowest: LowestBound,
     problem: FieldProblem,
     reach: _Reach,
     should_stop: ShouldStop,
     known: float,
     price: FloatArray | None,
     threads: int | None,
-) -> float:
+) -> None:
+    """Note the bounds that prices yield."""
     until_s = float(problem.until_s.max())
     weight = np.where(reach.possible, problem.weight, 0.0)
     n_uav, n_task = weight.shape
@@ -234,11 +239,12 @@ def _lagrangian(
         return replace(found, worth=np.array(net))
 
     begin = np.zeros(n_task) if price is None else price
-    return lagrangian_bound(
+    lagrangian_bound(
         pricing,
         begin,
         ListBundle(n_uav, begin),
         enough=max(0.0, known),
         rounds=rounds,
         should_stop=should_stop,
-    ).bound * (1.0 + _ROUNDING)
+        progress=lowest.note,
+    )

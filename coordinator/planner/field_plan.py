@@ -6,7 +6,7 @@ due time left out, then largest J). Pop-ups are unknown to a plan.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -65,6 +65,7 @@ class FieldRequest:
     threads: int | None
     modest: bool
     rates: Mapping[str, FlightRates]
+    bound_progress: Callable[[float], None] | None
 
 
 def is_field(mission: Mission) -> bool:
@@ -108,6 +109,7 @@ def make_field_plan(asked: FieldRequest) -> Plan:
             known=plan.objective,
             price=_worth_each(problem, found.lists, flown),
             threads=asked.threads,
+            progress=asked.bound_progress,
         )
         plan = replace(plan, bound=bound.objective, fewest_left_out=bound.fewest_left_out)
     return replace(plan, elapsed_s=asked.clock.now_s() - begin_s)
@@ -203,7 +205,7 @@ class _FieldSearch:
             self.problem,
             seed=self.asked.seed,
             stop=stop,
-            progress=self.asked.progress if self.method == "guided" else None,
+            progress=self.asked.progress,
             threads=self.asked.threads,
         )
         return _FieldLists(made.lists, made.sequence, made.iterations)

@@ -207,8 +207,8 @@ def make_plan(
         # Here: all that the field needs would let plans of plain missions begin later.
         from coordinator.planner.field_plan import FieldRequest, make_field_plan
 
-        asked = (seed, stop, progress, bound_s, bound_frac, threads, modest, rates or {})
-        return make_field_plan(FieldRequest(mission, method, clock, *asked))
+        asked = (stop, progress, bound_s, bound_frac, threads, modest, rates or {}, bound_progress)
+        return make_field_plan(FieldRequest(mission, method, clock, seed, *asked))
     begin_s = clock.now_s()
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop

@@ -49,6 +49,18 @@ def test_bound_is_close_where_batteries_are_endless() -> None:
     assert np.mean(shares) > np.mean(loose_shares)
 
 
+def test_it_only_ever_falls_and_every_fall_is_told() -> None:
+    problem = problem_of(2, "all", 3, 8)
+    told: list[float] = []
+
+    bound = field_bound(problem, after_evaluations(40), progress=told.append)
+
+    assert len(told) > 1
+    assert told == sorted(set(told), reverse=True)
+    assert told[0] < trivial(problem).objective
+    assert told[-1] == bound.objective
+
+
 def test_large_networks_are_bounded_without_looking_for_shorter_ways(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from coordinator.planner.field_plan import FIELD_METHODS
-from coordinator.planner.options import after_evaluations
+from coordinator.planner.options import Limit, after_evaluations
 from coordinator.planner.plan import make_plan
 from coordinator.planner.plan_report import plan_as_json, plan_from_json
 from swarm.allocation.field import FieldProblem, FieldState
@@ -106,6 +106,38 @@ def test_gap_is_null_where_more_is_left_out_than_need_be() -> None:
     assert worse.gap is None
     assert worse.basis == "leaves out more tasks than the proven optimum"
     assert replace(worse, optimum=None, bound=1.0).basis == "leaves out more tasks than the bound"
+
+
+def test_a_proof_keeps_to_its_part_of_a_limit_and_leaves_the_bound_the_rest() -> None:
+    asked = 0
+    worths: list[float] = []
+    told: list[tuple[int, float]] = []
+
+    def spent_frac(evaluations: float) -> float:
+        nonlocal asked
+        asked += 1
+        return asked / 200.0
+
+    plan = make_plan(
+        mission_of(made_up(0, "energy", n_uavs=2, n_tasks=16)),
+        "exact",
+        clock=SystemClock(),
+        stop=Limit(spent_frac),
+        progress=lambda _, worth: worths.append(worth),
+        bound_s=1e6,
+        bound_frac=0.97,
+        threads=1,
+        bound_progress=lambda bound: told.append((asked, bound)),
+    )
+
+    assert plan.optimum is None  # the proof was stopped
+    assert worths  # which a gap is told from
+    bounds = [bound for _, bound in told]
+    assert len(bounds) > 1
+    assert bounds == sorted(set(bounds), reverse=True)
+    assert plan.bound == bounds[-1]
+    assert told[0][0] < 20
+    assert asked < 210
 
 
 def test_the_same_seed_gives_the_same_plan() -> None:
