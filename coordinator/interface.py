@@ -44,7 +44,7 @@ def plan(
         seed=seed,
         stop=None if time_limit_s is None else after_time(clock, time_limit_s),
         bound_s=BOUND_S if bound else None,
-        bound_frac=bound_frac(time_limit_s),
+        bound_frac=bound_frac(time_limit_s, proves=method == "exact"),
     )
 
 

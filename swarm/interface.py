@@ -153,6 +153,7 @@ def plan(
             mission; or a rule of one's own, by which the UAVs decide in the mission's order.
         seed: of what is drawn in the search; >= 0.
         time_limit_s: for all of it, the bound included [s]; some seconds by itself when None.
+            All of it is the proof's with ``"exact"``.
         bound: where the optimum cannot be proven, spend some seconds on an upper bound on J.
 
     Returns:

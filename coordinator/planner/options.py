@@ -33,13 +33,16 @@ _BOUND_FRAC = 0.25
 """The most of a limit that is kept for that."""
 
 
-def bound_frac(time_limit_s: float | None) -> float:
-    """The share of a limit [s] that is kept for an upper bound; 0 without a limit."""
-    return min(_BOUND_FRAC, BOUND_S / time_limit_s) if time_limit_s else 0.0
+def bound_frac(time_limit_s: float | None, *, proves: bool) -> float:
+    """The share of a limit [s] that is kept for an upper bound; 0 without a limit.
+
+    Where the search ``proves`` itself, nothing is kept from it.
+    """
+    return min(_BOUND_FRAC, BOUND_S / time_limit_s) if time_limit_s and not proves else 0.0
 
 
 def whole_limit(
-    time_limit_s: float | None, bound_s: float | None, *, proves: bool = False
+    time_limit_s: float | None, bound_s: float | None, *, proves: bool
 ) -> tuple[float | None, float]:
     """The time for search and bound together [s], and the share of it kept for the bound.
 
@@ -49,7 +52,7 @@ def whole_limit(
         proves: the search is a proof itself, for which nothing is kept unless it is asked for.
     """
     if time_limit_s is None or bound_s is None:
-        return time_limit_s, 0.0 if proves else bound_frac(time_limit_s)
+        return time_limit_s, bound_frac(time_limit_s, proves=proves)
     whole_s = time_limit_s + bound_s
     return whole_s, bound_s / whole_s
 

@@ -15,6 +15,7 @@ import pytest
 import coordinator.interface
 import sim.interface
 import swarm
+from coordinator.planner.plan import make_plan
 from sim.world.uncertainty import Uncertainty
 from swarm.interface import UncertaintyOptions
 from swarm.model import UavId
@@ -83,6 +84,22 @@ def test_a_plan_is_flown_as_planned_and_worth_what_evaluate_says() -> None:
     assert found.objective == pytest.approx(flight.objective)
     assert found.completion_s == pytest.approx(flight.completion_s)
     assert swarm.evaluate(TABLE_1, {}).objective == 0.0
+
+
+@pytest.mark.parametrize(("method", "kept_frac"), [("greedy", 0.25), ("exact", 0.0)])
+def test_of_a_limit_a_bound_is_kept_a_share_but_from_a_proof_nothing(
+    method: str, kept_frac: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept = []
+
+    def noted(mission: swarm.Mission, method: str, **options: Any) -> swarm.Plan:
+        kept.append(options["bound_frac"])
+        return make_plan(mission, method, **options)
+
+    monkeypatch.setattr("coordinator.interface.make_plan", noted)
+    swarm.plan(TABLE_1, method, time_limit_s=10.0)
+
+    assert kept == [kept_frac]
 
 
 def test_agents_fly_by_the_users_rule_as_it_was_planned() -> None:

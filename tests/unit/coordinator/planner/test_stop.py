@@ -99,6 +99,6 @@ def test_asked_about_nothing_only_time_and_wishes_end_it() -> None:
 
 
 def test_nothing_of_a_limit_is_kept_from_a_proof_unless_it_is_asked_for() -> None:
-    assert whole_limit(10.0, None) == (10.0, 0.25)
+    assert whole_limit(10.0, None, proves=False) == (10.0, 0.25)
     assert whole_limit(10.0, None, proves=True) == (10.0, 0.0)
     assert whole_limit(10.0, 30.0, proves=True) == (40.0, 0.75)
