@@ -230,6 +230,29 @@ def test_prices_of_a_bundle_are_the_best_near_the_centre(seed: int) -> None:
     assert (np.bincount(uavs, weights=shares, minlength=n_uav) <= 1.0 + 1e-9).all()
 
 
+@settings(deadline=None, max_examples=20)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_lists_that_a_bundle_knows_leave_it_as_it_was(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    n_list = 4000
+    lists = [rng.integers(0, 6, rng.integers(1, 8)).tolist() for _ in range(n_list)]
+    worths = rng.choice(np.array([-1.0, -0.5, 0.0, 0.5, 1.0]), n_list)
+    distinct = {(tuple(one), worth) for one, worth in zip(lists, worths.tolist(), strict=True)}
+    bundle = ListBundle(2, rng.uniform(0.0, 1.0, 6))
+
+    bundle.add([1] * n_list, worths, lists)
+    bundle.solve(1.0, 0.0, sweeps=20)
+    value, shares = bundle.value, bundle.shares()
+    again = rng.permutation(n_list)
+    bundle.add([1] * n_list, worths[again], [lists[k] for k in again])
+
+    assert len(shares) == len(distinct) < n_list
+    assert bundle.shares().tobytes() == shares.tobytes()
+    assert bundle.value == value
+    bundle.add([0], [worths[0]], [lists[0]])  # which another UAV does not know
+    assert len(bundle.shares()) == len(distinct) + 1
+
+
 def test_from_centre_to_centre_prices_reach_the_best() -> None:
     bundle = ListBundle(2, np.zeros(1))
     bundle.add([0, 1], [10.0, 4.0], [[0], [0]])
