@@ -16,7 +16,7 @@ from coordinator.planner.bound import meets, upper_bound
 from coordinator.planner.options import after_time
 from coordinator.planner.plan import better_lists, guided_plan
 from sim.bench.machine import this_machine
-from sim.bench.results import BenchResult, Progress, table_of, unheard
+from sim.bench.results import BenchResult, Progress, size_name, table_of, unheard
 from sim.study.generator import random_mission
 from swarm.allocation import evaluate
 from swarm.allocation.problem import Problem
@@ -102,11 +102,11 @@ def measure_bounds(
     bounds = []
     for n_uav, n_task in sizes:
         for seed in seeds:
-            tell(f"{n_uav}×{n_task}, seed {seed}: guided")
+            which = f"{size_name(n_uav, n_task)}, seed {seed}"
+            tell(f"{which}: guided")
             problem, lists = _planned(n_uav, n_task, seed, clock, search_s)
-            tell(f"{n_uav}×{n_task}, seed {seed}: bound")
-            measured = _bounded(problem, lists, clock, limit_s)
-            bounds.append(replace(measured, size=f"{n_uav}×{n_task}", seed=seed))
+            tell(f"{which}: bound")
+            bounds.append(_bounded(problem, seed, lists, clock, limit_s))
     return BoundBench(machine, search_s, limit_s, tuple(bounds))
 
 
@@ -123,7 +123,7 @@ def _planned(
 
 
 def _bounded(
-    problem: Problem, lists: Sequence[Sequence[int]], clock: Clock, limit_s: float
+    problem: Problem, seed: int, lists: Sequence[Sequence[int]], clock: Clock, limit_s: float
 ) -> BoundMeasurement:
     objective = found = evaluate(problem, lists)[0]
     begin_s = clock.now_s()
@@ -138,8 +138,8 @@ def _bounded(
         found = evaluate(problem, better_lists(problem, lists, bound.lists))[0]
     proven = meets(bound.objective, found)
     return BoundMeasurement(
-        size="",
-        seed=0,
+        size=size_name(problem.n_uav, problem.n_task),
+        seed=seed,
         horizon_s=problem.horizon_s,
         objective=found,
         bound=bound.objective,

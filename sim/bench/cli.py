@@ -11,14 +11,17 @@ import typer
 
 from sim.bench.command_line import (
     LONGEST_S,
-    SEED,
+    MarkdownOption,
     Reader,
+    SeedsOption,
     check_files,
     each,
     limit_of,
     progress,
+    seeds_of,
     show,
     size_of,
+    sizes_of,
     write_file,
 )
 from sim.bench.legs import legs
@@ -83,9 +86,7 @@ def plan(
         str,
         typer.Option("--time-limit-s", metavar="S,…", help="Time for each method; one or several."),
     ] = "10",
-    seeds: Annotated[
-        str, typer.Option("--seeds", metavar="N,…", help="Of random missions and methods.")
-    ] = "0,1,2",
+    seeds: SeedsOption = "0,1,2",
     methods: Annotated[
         str | None,
         typer.Option(
@@ -131,15 +132,7 @@ def plan(
             show_default=False,
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="FILE.md",
-            help="Also write the tables as Markdown.",
-            show_default=False,
-        ),
-    ] = None,
+    out: MarkdownOption = None,
 ) -> int:
     """Compare planning methods side by side, each with the same time.
 
@@ -164,7 +157,7 @@ def plan(
     from sim.bench.solvers import MissionSource, methods_for
 
     limits_s = each("--time-limit-s", time_limit_s, limit_of)
-    all_seeds = each("--seeds", seeds, SEED)
+    all_seeds = seeds_of(seeds)
     known = methods_for(MissionSource(field=field))
     default_methods = "guided,greedy" if scaling else ",".join(known)
     names = each("--methods", methods or default_methods, _one_of(known))
@@ -240,6 +233,7 @@ def _sources(
     scenario: Path | None, sizes: str | None, default: str
 ) -> list[tuple[str, MissionSource]]:
     """Cases by name, the scenario first."""
+    from sim.bench.results import size_name
     from sim.bench.solvers import MissionSource
     from swarm.scenario import load_scenario, require_plain
 
@@ -249,8 +243,9 @@ def _sources(
         require_plain(mission, "swarm bench")
         found.append((mission.name, MissionSource(scenario=str(scenario.resolve()))))
     if scenario is None or sizes is not None:
-        for n_uav, n_task in each("--sizes", sizes or default, size_of):
-            found.append((f"{n_uav}×{n_task}", MissionSource(n_uav=n_uav, n_task=n_task)))
+        for n_uav, n_task in sizes_of(sizes or default):
+            source = MissionSource(n_uav=n_uav, n_task=n_task)
+            found.append((size_name(n_uav, n_task), source))
     return found
 
 

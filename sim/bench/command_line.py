@@ -38,6 +38,18 @@ ValleyArgument = Annotated[
 BusKindOption = Annotated[
     str, typer.Option("--bus", metavar="mesh|router", help="How the processes talk.")
 ]
+SizesOption = Annotated[
+    str, typer.Option("--sizes", metavar="NxM,…", help="UAVs and tasks of random missions.")
+]
+SeedsOption = Annotated[
+    str, typer.Option("--seeds", metavar="N,…", help="Of random missions and of searches.")
+]
+MarkdownOption = Annotated[
+    Path | None,
+    typer.Option(
+        "--out", metavar="FILE.md", help="Also write the tables as Markdown.", show_default=False
+    ),
+]
 
 
 def each(flag: str, text: str, read: Reader[T]) -> list[T]:
@@ -58,8 +70,25 @@ def integer(least: int, most: int, problem: str, remedy: str) -> Reader[int]:
     return read
 
 
-SEED = integer(0, 10**18 - 1, "no seed", "give whole numbers from 0 on, such as 0,1")
-"""Reads a seed."""
+_SEED = integer(0, 10**18 - 1, "no seed", "give whole numbers from 0 on, such as 0,1")
+
+
+def seeds_of(text: str) -> list[int]:
+    """The seeds that ``--seeds`` names.
+
+    Raises:
+        InputError: one of them is none.
+    """
+    return each("--seeds", text, _SEED)
+
+
+def sizes_of(text: str) -> list[tuple[int, int]]:
+    """How many UAVs and tasks each size has that ``--sizes`` names.
+
+    Raises:
+        InputError: one of them is none.
+    """
+    return each("--sizes", text, size_of)
 
 
 def size_of(flag: str, word: str) -> tuple[int, int]:

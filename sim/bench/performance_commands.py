@@ -13,7 +13,8 @@ import typer
 
 from sim.bench.command_line import (
     LONGEST_S,
-    SEED,
+    SeedsOption,
+    SizesOption,
     ValleyArgument,
     check_files,
     each,
@@ -21,8 +22,10 @@ from sim.bench.command_line import (
     launch_options,
     progress,
     require_proc,
+    seeds_of,
     show,
     size_of,
+    sizes_of,
     write_file,
 )
 from sim.options import ChanceOptions
@@ -331,12 +334,8 @@ def flight(
 
 
 def replan(
-    sizes: Annotated[
-        str, typer.Option("--sizes", metavar="NxM,…", help="UAVs and tasks of the random missions.")
-    ] = "50x500,200x5000",
-    seeds: Annotated[
-        str, typer.Option("--seeds", metavar="K,…", help="Seeds of missions and of the search.")
-    ] = "0",
+    sizes: SizesOption = "50x500,200x5000",
+    seeds: SeedsOption = "0",
     long_run_s: Annotated[
         float,
         typer.Option(
@@ -372,8 +371,7 @@ def replan(
     from swarm.runtime.clock import SystemClock
 
     check_files(None, out)
-    wanted = each("--sizes", sizes, size_of)
-    chosen = each("--seeds", seeds, SEED)
+    wanted, chosen = sizes_of(sizes), seeds_of(seeds)
     with progress() as tell:
         done = measure_replans(wanted, chosen, SystemClock(), unhurried_s=long_run_s, progress=tell)
     show(done, json=json)
@@ -388,12 +386,8 @@ def replan(
 
 
 def bound(
-    sizes: Annotated[
-        str, typer.Option("--sizes", metavar="NxM,…", help="UAVs and tasks of random missions.")
-    ] = "10x50,50x500",
-    seeds: Annotated[
-        str, typer.Option("--seeds", metavar="N,…", help="Of missions and of the search.")
-    ] = "0,1,2",
+    sizes: SizesOption = "10x50,50x500",
+    seeds: SeedsOption = "0,1,2",
     search_s: Annotated[
         float,
         typer.Option(
@@ -424,10 +418,10 @@ def bound(
     from sim.bench.bounds import measure_bounds
     from swarm.runtime.clock import SystemClock
 
-    which, numbers = each("--sizes", sizes, size_of), each("--seeds", seeds, SEED)
+    wanted, chosen = sizes_of(sizes), seeds_of(seeds)
     with progress() as tell:
         done = measure_bounds(
-            which, numbers, SystemClock(), search_s=search_s, limit_s=time_limit_s, tell=tell
+            wanted, chosen, SystemClock(), search_s=search_s, limit_s=time_limit_s, tell=tell
         )
     show(done, json=json)
     return 0

@@ -27,7 +27,7 @@ from coordinator.planner.online import (
 from coordinator.planner.options import ShouldStop, after_evaluations, after_time, first_of
 from coordinator.planner.plan import guided_plan
 from sim.bench.machine import this_machine
-from sim.bench.results import BenchResult, Progress, table_of, unheard
+from sim.bench.results import BenchResult, Progress, size_name, table_of, unheard
 from sim.bench.solvers import MissionSource, problem_of
 from swarm.allocation import Problem, TeamState, evaluate
 from swarm.allocation.problem import BoolArray, FloatArray
@@ -72,7 +72,7 @@ class ReplanTime:
     @property
     def size(self) -> str:
         """UAVs and tasks."""
-        return f"{self.n_uav}×{self.n_task}"
+        return size_name(self.n_uav, self.n_task)
 
     @property
     def gain_frac(self) -> float:
@@ -131,7 +131,7 @@ def measure_replans(
             problem = problem_of(MissionSource(n_uav=n_uav, n_task=n_task, seed=seed))
             disturbed = Disturbed.of(problem, seed)
             for moment in ("start", "midway"):
-                progress(f"{n_uav}×{n_task}, seed {seed}, {moment}")
+                progress(f"{size_name(n_uav, n_task)}, seed {seed}, {moment}")
                 situation = disturbed.situation(midway=moment == "midway")
                 found = _measured(situation, disturbed.course, seed, clock, unhurried_s)
                 times.append(replace(found, moment=moment))

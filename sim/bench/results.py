@@ -44,6 +44,11 @@ class BenchResult(ABC):
         return Group(*(Text(part) if isinstance(part, str) else part for part in parts))
 
 
+def size_name(n_uav: int, n_task: int) -> str:
+    """What tables call missions of so many UAVs and tasks."""
+    return f"{n_uav}×{n_task}"
+
+
 def table_of(rows: Iterable[object], *columns: Column, title: str = "") -> ResultTable:
     """A table in which every column shows the attribute of the rows that its key names."""
     getters = [attrgetter(column.key) for column in columns]

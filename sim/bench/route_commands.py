@@ -7,7 +7,17 @@ from typing import Annotated
 
 import typer
 
-from sim.bench.command_line import SEED, check_files, each, limit_of, progress, show, write_file
+from sim.bench.command_line import (
+    MarkdownOption,
+    SeedsOption,
+    check_files,
+    each,
+    limit_of,
+    progress,
+    seeds_of,
+    show,
+    write_file,
+)
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 from swarm.runtime.options import JsonOption
 
@@ -34,9 +44,7 @@ def routes(
     time_limit_s: Annotated[
         str, typer.Option("--time-limit-s", metavar="S", help="Time for each search.")
     ] = "10",
-    seeds: Annotated[
-        str, typer.Option("--seeds", metavar="N,…", help="Of the searches of each instance.")
-    ] = ",".join(map(str, range(10))),
+    seeds: SeedsOption = "0,1,2,3,4,5,6,7,8,9",
     methods: Annotated[
         str,
         typer.Option("--methods", metavar="NAME,…", help="Among guided, ortools and vrp-cli."),
@@ -60,15 +68,7 @@ def routes(
             show_default=False,
         ),
     ] = None,
-    out: Annotated[
-        Path | None,
-        typer.Option(
-            "--out",
-            metavar="FILE.md",
-            help="Also write the table as Markdown.",
-            show_default=False,
-        ),
-    ] = None,
+    out: MarkdownOption = None,
 ) -> int:
     """Search published instances, and compare with the best values known.
 
@@ -91,7 +91,7 @@ def routes(
     from sim.bench.routes import measure_routes
 
     limit_s = limit_of("--time-limit-s", time_limit_s)
-    all_seeds = each("--seeds", seeds, SEED)
+    all_seeds = seeds_of(seeds)
     names = each("--methods", methods, _method)
     check_files(plot, out, new_best)
     found = read_instances(instances, only)
