@@ -83,7 +83,7 @@ def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: DecisionTurn) -
     state, order = _team_at(problem, board, turn)
     if not state.open.any():
         return None
-    process = decisions(problem, state, order, rule)
+    process = decisions(problem, state, order, rule, last=mine)
     return next((decision for decision in process if decision.uav == mine), None)
 
 

@@ -53,9 +53,9 @@ _SWEEPS, _ROUGH_SWEEPS = 300, 50
 _SETTLED = 1e-7
 """Of the bound: no prices lower it by more."""
 _GROUPS = 10
-_PASSES = 16
+_PASSES = 8
 _ROUGH_NEAR, _ROUGH_HEADS = 16, 300
-_FIRST_ROUGH_STEP, _LAST_ROUGH_STEP = 0.03, 0.004
+_FIRST_ROUGH_STEP, _LAST_ROUGH_STEP = 0.03, 0.012
 """As shares of the bound per task."""
 _ROUGH_FRAC = 0.4
 """The most of a limit that goes by before the first bound is worked out."""

@@ -167,10 +167,13 @@ def rank_of(sequence: Sequence[int]) -> IntArray:
     return rank
 
 
-def decisions(problem: Problem, state: TeamState, rank: IntArray, rule: Rule) -> Iterator[Decision]:
+def decisions(
+    problem: Problem, state: TeamState, rank: IntArray, rule: Rule, last: int | None = None
+) -> Iterator[Decision]:
     """Decide in the order of Fig. 1 until no active UAV has an open task it is capable of.
 
-    ``state`` is left unchanged; ``rank`` is as `rank_of` gives it.
+    With ``last`` it ends once that UAV has had its turn, its decision being the last one if it
+    takes a task. ``state`` is left unchanged; ``rank`` is as `rank_of` gives it.
     """
     state = state.copy()
     queue = [
@@ -184,12 +187,14 @@ def decisions(problem: Problem, state: TeamState, rank: IntArray, rule: Rule) ->
     while queue:
         _, place, uav = heappop(queue)
         decision = rule.decide(problem, state, rank, uav)
-        if decision is None:
-            continue  # tasks only close, so this UAV has no further decision
-        state.apply(problem, decision)
-        if isfinite(decision.completion_s):
-            heappush(queue, (decision.completion_s, place, uav))
-        yield decision
+        if decision is not None:
+            state.apply(problem, decision)
+            if isfinite(decision.completion_s):
+                heappush(queue, (decision.completion_s, place, uav))
+            yield decision
+        # Who takes none has no further decision, as tasks only close.
+        if uav == last:
+            return
 
 
 def next_decision(
