@@ -303,8 +303,8 @@ def flight(
     The real cores of all agents and of the coordinator fly it in one process, on an ideal bus.
     Unless --loss and --popup say otherwise, 30% of the UAVs are lost and 30% of the tasks pop
     up. Times are processor time; all else follows from the seed. At 200x5000 a re-plan takes
-    some seconds, and a mission three quarters of an hour: with an interval of 5 s most of the
-    work would be re-plans.
+    some seconds: with an interval of 5 s most of the work would be re-plans. Such a flight takes
+    half an hour or more, 100x2500 five minutes.
 
     Examples:
         swarm bench flight

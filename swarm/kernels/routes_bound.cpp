@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <map>
 #include <numeric>
 #include <queue>
 #include <utility>
@@ -309,13 +308,7 @@ class WorthyRealLists {
 
   WorthyLists run() {
     for (int l = 0; l < offer_.n(); ++l) reach(l, offer_.first_s[l], 1.0, 0.0, 0.0);
-    WorthyLists found;
-    found.all = left_ > 0 && !watch_.stopped();
-    for (const auto& [tasks, list] : best_) {
-      found.lists.push_back(list.second);
-      found.worth.push_back(list.first);
-    }
-    return found;
+    return best_.found(left_ > 0 && !watch_.stopped());
   }
 
  private:
@@ -333,18 +326,11 @@ class WorthyRealLists {
     survived *= offer_.survival[l];
     list_.push_back(offer_.tasks[l]);
     on_it_[l] = 1;
-    if (earned >= floor_) keep(worth);
+    if (earned >= floor_) best_.keep(list_, worth);
     for (int next = 0; next < offer_.n() && !over; ++next)
       if (!on_it_[next]) reach(next, time_s + offer_.leg(l, next), survived, earned, worth);
     on_it_[l] = 0;
     list_.pop_back();
-  }
-
-  void keep(double worth) {
-    Route tasks = list_;
-    std::sort(tasks.begin(), tasks.end());
-    auto& best = best_[tasks];
-    if (best.second.empty() || worth > best.first) best = {worth, list_};
   }
 
   const TimedOffer& offer_;
@@ -354,7 +340,7 @@ class WorthyRealLists {
   Watch& watch_;
   std::vector<char> on_it_;
   Route list_;
-  std::map<Route, std::pair<double, Route>> best_;  // by their tasks in order
+  BestLists best_;
 };
 
 PricedList relaxed_list(const Problem& problem, const Start& start, int uav,

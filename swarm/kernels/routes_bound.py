@@ -20,7 +20,7 @@ import numpy.typing as npt
 
 from swarm.kernels import _kernels
 from swarm.kernels.routes import FloatArray, TeamArrays, lists_of
-from swarm.kernels.routes_pricing import PricedLists, WorthyLists
+from swarm.kernels.routes_pricing import PricedLists, WorthyLists, checked_most
 
 MOST_BUCKETS = 100_000
 
@@ -143,11 +143,7 @@ def worthy_timed_lists(
         ValueError: names the argument that is wrong.
     """
     prices, count = _checked(team, price, bucket_s, timetable, threads)
-    bests = np.array(most, dtype=np.float64, order="C")
-    if bests.shape != (team.problem.n_uav,) or not np.isfinite(bests).all():
-        raise ValueError(f"most must be {team.problem.n_uav} finite numbers")
-    if not slack >= 0.0:
-        raise ValueError(f"slack must be >= 0, not {slack}")
+    bests = checked_most(team, most, slack)
     if heads < 1:
         raise ValueError(f"heads must be >= 1, not {heads}")
     complete, uav, worth, lists = _kernels.worthy_timed_lists(

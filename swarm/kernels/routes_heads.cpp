@@ -1,7 +1,6 @@
 #include "routes_heads.hpp"
 
 #include <algorithm>
-#include <map>
 
 namespace peckorder {
 
@@ -85,13 +84,7 @@ class Enumeration {
 
   WorthyLists run() {
     for (int i = 0; i < offer_.n(); ++i) reach(i, offer_.first_s[i], 0.0, 0.0, 1);
-    WorthyLists found;
-    found.all = left_ > 0 && !watch_.stopped();
-    for (const auto& [tasks, list] : best_) {
-      found.lists.push_back(list.second);
-      found.worth.push_back(list.first);
-    }
-    return found;
+    return best_.found(left_ > 0 && !watch_.stopped());
   }
 
  private:
@@ -103,7 +96,7 @@ class Enumeration {
     worth += offer_.weight[i] * (offer_.left_s - time_s);
     list_.push_back(offer_.tasks[i]);
     on_it_[i] = 1;
-    if (earned >= floor_) keep(worth);
+    if (earned >= floor_) best_.keep(list_, worth);
     for (int next = 0; next < offer_.n(); ++next) {
       if (on_it_[next]) continue;
       const double then_s = time_s + offer_.leg_s(i, next);
@@ -114,13 +107,6 @@ class Enumeration {
     list_.pop_back();
   }
 
-  void keep(double worth) {
-    Route tasks = list_;
-    std::sort(tasks.begin(), tasks.end());
-    auto& best = best_[tasks];
-    if (best.second.empty() || worth > best.first) best = {worth, list_};
-  }
-
   const Offer& offer_;
   const Tails& tails_;
   double floor_;
@@ -128,7 +114,7 @@ class Enumeration {
   Watch& watch_;
   std::vector<char> on_it_;
   Route list_;
-  std::map<Route, std::pair<double, Route>> best_;  // by their tasks in order
+  BestLists best_;
 };
 
 }  // namespace

@@ -7,7 +7,10 @@
 // search among beginnings (routes_heads.hpp). See coordinator/planner/bound.py.
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <map>
+#include <utility>
 #include <vector>
 
 #include "routes_solution.hpp"
@@ -40,6 +43,30 @@ struct WorthyLists {
   bool all = true;  // none is missing
   std::vector<Route> lists;
   std::vector<double> worth;  // of each, before paying
+};
+
+// The best list of each set of tasks.
+class BestLists {
+ public:
+  void keep(const Route& list, double worth) {
+    Route tasks = list;
+    std::sort(tasks.begin(), tasks.end());
+    auto& best = best_[tasks];
+    if (best.second.empty() || worth > best.first) best = {worth, list};
+  }
+
+  WorthyLists found(bool all) const {
+    WorthyLists found;
+    found.all = all;
+    for (const auto& [tasks, list] : best_) {
+      found.lists.push_back(list.second);
+      found.worth.push_back(list.first);
+    }
+    return found;
+  }
+
+ private:
+  std::map<Route, std::pair<double, Route>> best_;  // by their tasks in order
 };
 
 // Per UAV all real lists, the empty one apart, that earn at least `most` of it less the slack, where

@@ -123,11 +123,7 @@ def worthy_lists(
         ValueError: names the argument that is wrong.
     """
     prices, count = _checked(team, price, heads, threads)
-    bests = np.array(most, dtype=np.float64, order="C")
-    if bests.shape != (team.problem.n_uav,) or not np.isfinite(bests).all():
-        raise ValueError(f"most must be {team.problem.n_uav} finite numbers")
-    if not slack >= 0.0:
-        raise ValueError(f"slack must be >= 0, not {slack}")
+    bests = checked_most(team, most, slack)
     complete, uav, worth, lists = _kernels.worthy_lists(
         team.problem,
         *team.arguments(),
@@ -204,6 +200,20 @@ class ListBundle:
     def shares(self) -> FloatArray:
         """(n_list,) how much of each list the last `solve` would fly, by UAVs and in order."""
         return self._bundle.shares()
+
+
+def checked_most(team: TeamArrays, most: FloatArray, slack: float) -> FloatArray:
+    """(n_uav,) what lists earn at most [value·s], as kernels take it.
+
+    Raises:
+        ValueError: names the argument that is wrong, ``slack`` [value·s; >= 0] among them.
+    """
+    bests = np.array(most, dtype=np.float64, order="C")
+    if bests.shape != (team.problem.n_uav,) or not np.isfinite(bests).all():
+        raise ValueError(f"most must be {team.problem.n_uav} finite numbers")
+    if not slack >= 0.0:
+        raise ValueError(f"slack must be >= 0, not {slack}")
+    return bests
 
 
 def _checked(

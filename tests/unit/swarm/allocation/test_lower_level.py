@@ -18,7 +18,8 @@ from swarm.allocation import (
     rule_by_name,
     run,
 )
-from swarm.allocation.problem import FloatArray
+from swarm.allocation.lower_level import Decision, Rule
+from swarm.allocation.problem import FloatArray, IntArray
 from tests.support import reference
 from tests.support.problems import any_problem, random_problem, table_1
 
@@ -84,6 +85,40 @@ def test_the_state_passed_in_is_left_alone() -> None:
 
     assert state.open.all()
     assert not state.free_s.any()
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=SEEDS, n_uav=st.integers(1, 4), n_task=st.integers(0, 8))
+def test_it_ends_with_the_turn_of_the_last_uav_asked_about(
+    seed: int, n_uav: int, n_task: int
+) -> None:
+    problem = any_problem(seed, n_uav, n_task)
+    state, rank = TeamState.at_start(problem), np.arange(n_uav)
+    everything = list(decisions(problem, state, rank, rule_by_name("greedy")))
+
+    for uav in range(n_uav):
+        rule = _Asked(rule_by_name("greedy"))
+        until = list(decisions(problem, state, rank, rule, last=uav))
+
+        own = [k for k, decision in enumerate(everything) if decision.uav == uav]
+        assert until == everything[: own[0] + 1 if own else len(until)]
+        assert rule.uavs[-1:] == [uav]
+        assert rule.uavs.count(uav) == 1
+
+
+class _Asked:
+    """A rule that notes whom it was asked about."""
+
+    def __init__(self, rule: Rule) -> None:
+        self._rule = rule
+        self.name = rule.name
+        self.uavs: list[int] = []
+
+    def decide(
+        self, problem: Problem, state: TeamState, rank: IntArray, uav: int
+    ) -> Decision | None:
+        self.uavs.append(uav)
+        return self._rule.decide(problem, state, rank, uav)
 
 
 def test_equal_times_are_ordered_by_the_sequence() -> None:

@@ -11,7 +11,7 @@ from swarm.allocation import Problem, TeamState, evaluate, run
 from swarm.allocation.lower_level import Decision
 from swarm.allocation.rules import GuidedRule, team_arrays, team_at_start
 from swarm.kernels.rollout import guided_choice
-from swarm.kernels.routes import optimise_routes
+from swarm.kernels.routes import ListArrays, optimise_routes
 from tests.support.problems import any_problem, random_problem
 from tests.support.reference import repaired, team_worth
 
@@ -154,6 +154,19 @@ def test_every_replica_decides_alike(n_uav: int, n_task: int) -> None:
 
     assert isinstance(a, Decision)
     assert a == b
+
+
+@settings(deadline=None, max_examples=40)
+@given(seed=SEEDS, iterations=st.sampled_from([0, 20]))
+def test_lists_kept_as_arrays_are_decided_by_alike(seed: int, iterations: int) -> None:
+    problem = any_problem(seed, 3, 9)
+    lists = any_lists(problem, np.random.default_rng(seed), left_out=0.2)
+    team = team_at_start(problem)
+    arrays = ListArrays.of(lists, 3, 9)
+
+    for uav in range(3):
+        found = [guided_choice(team, each, uav, iterations=iterations) for each in (lists, arrays)]
+        assert found[0] == found[1]
 
 
 def test_a_uav_free_at_an_unknown_time_does_not_spoil_the_numbers() -> None:
