@@ -255,7 +255,7 @@ class Tasking(AgentPart, ABC):
         """Whether ``task`` is among those that pay best from here, or few are open."""
         board, me = self._mission_view.board, self._mission_view.me
         place = self._mission_view.place_enu_m
-        if board.n_open <= _MANY_TASKS or place is None or me is None:
+        if len(board.open) <= _MANY_TASKS or place is None or me is None:
             return True
         if task not in board.states:
             return False

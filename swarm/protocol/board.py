@@ -13,14 +13,13 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from enum import StrEnum
 from itertools import islice
 
-import numpy as np
-
 from swarm.allocation import field
 from swarm.allocation.lower_level import Rule, TeamState
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
 from swarm.model import Mission, Task
 from swarm.model.mission import PLAIN_CONSTRAINTS
+from swarm.protocol.attempts import Attempts
 from swarm.protocol.board_arrays import (
     BOARD_ARRAYS,
     BoardArrays,
@@ -92,8 +91,8 @@ def anything_doable(board: TaskBoard, present: Collection[str]) -> bool:
         for index, uav in enumerate(problem.uav_ids)
         if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
     ]
-    states, capable = board.states, problem.capable
-    open_ = (c for c, task in enumerate(problem.task_ids) if states.get(task) is TaskState.OPEN)
+    all_open, capable = board.open, problem.capable
+    open_ = (column for column, task in enumerate(problem.task_ids) if task in all_open)
     # Mostly one of the first will do.
     first = list(islice(open_, _LOOKED_AT_FIRST))
     return bool(capable[:, first][able].any() or capable[:, list(open_)][able].any())
@@ -126,11 +125,12 @@ class TaskBoard:
         self._states: dict[str, TaskState] = {}
         self.generation = 0
         """Of the states: grows when they were worked out anew, not when some came or changed."""
-        self._n_open = 0
-        self._ended: list[tuple[float, int, str, str]] = []
+        self._open: set[str] = set()
+        """Tasks of that state."""
+        self._attempts = Attempts()
         self._basis: tuple[int, int] | None = None
         """Versions of brief and board, and of outcomes apart from further ones, of the states."""
-        self._attempts = 0
+        self._n_outcomes = 0
         """How many outcomes the states take into account."""
         self._arrays: BoardArrays | None = None
         self._arrays_version = -1, -1
@@ -144,23 +144,21 @@ class TaskBoard:
         return self._states
 
     @property
-    def ended(self) -> list[tuple[float, int, str, str]]:
-        """Completion [s], number, task and UAV of every attempt at a task on the board, in that
-        order: one after the other, and at one time in board order.
-        """
-        self._catch_up()
-        return self._ended
-
-    @property
     def unfinished(self) -> bool:
         """Whether any task on the board is open."""
-        return self.n_open > 0
+        return bool(self.open)
 
     @property
-    def n_open(self) -> int:
-        """How many tasks on the board are open."""
+    def open(self) -> Collection[str]:
+        """Tasks on the board that are open, in no order."""
         self._catch_up()
-        return self._n_open
+        return self._open
+
+    @property
+    def attempts(self) -> Attempts:
+        """At tasks on the board."""
+        self._catch_up()
+        return self._attempts
 
     @property
     def problem(self) -> Problem | None:
@@ -268,29 +266,30 @@ class TaskBoard:
         """
         replica, outcomes = self.replica, self.replica.outcomes
         basis = replica.board_version, replica.reattempts
-        if basis == self._basis and len(outcomes) == self._attempts:
+        if basis == self._basis and len(outcomes) == self._n_outcomes:
             return
         if self._arrays_version[0] != basis[0]:
             # The newest of this process are kept elsewhere; others need not wait to be forgotten.
             self._arrays, self._arrays_version = None, (-1, -1)
         if basis != self._basis and not self._add_entries(basis):
             self._states = {task: _untried(entry) for task, entry in replica.board.items()}
-            self._n_open = sum(state is TaskState.OPEN for state in self._states.values())
-            self._attempts, self._ended = 0, []
+            self._open = {t for t, state in self._states.items() if state is TaskState.OPEN}
+            self._n_outcomes, self._attempts = 0, Attempts()
             self.generation += 1
         final = replica.brief is None or not replica.brief.reattempt_failed
-        states, further = self._states, len(outcomes) - self._attempts
+        states, further = self._states, len(outcomes) - self._n_outcomes
         for (uav, task), outcome in islice(reversed(outcomes.items()), further):
             before = states.get(task)
             if before is None:
                 continue
-            insort(self._ended, (outcome.completed_s, replica.board[task].number, task, uav))
+            self._attempts.add(outcome.completed_s, replica.board[task].number, task, uav)
             if outcome.result is AttemptResult.DONE:
                 states[task] = TaskState.DONE
             elif final and before is TaskState.OPEN:
                 states[task] = TaskState.FAILED
-            self._n_open -= before is TaskState.OPEN and states[task] is not TaskState.OPEN
-        self._attempts = len(outcomes)
+            if states[task] is not TaskState.OPEN:
+                self._open.discard(task)
+        self._n_outcomes = len(outcomes)
         self._basis = basis
 
     def _add_entries(self, basis: tuple[int, int]) -> bool:
@@ -304,7 +303,8 @@ class TaskBoard:
             return False
         for entry in reversed(new):
             self._states[entry.task] = _untried(entry)
-            self._n_open += not entry.withdrawn
+            if not entry.withdrawn:
+                self._open.add(entry.task)
         return True
 
 
@@ -357,20 +357,8 @@ def after_outcomes(problem: Problem, board: TaskBoard) -> TeamState:
     ``free_s`` and ``place_enu_m`` are of the last attempt, or 0 and the start before the first;
     ``open`` is as on the board. All are active: who takes part is the caller's judgement.
     """
-    state = TeamState.at_start(problem)
-    states, row_of, column_of = board.states, problem.row_of, problem.column_of
-    state.open[:] = [states.get(task) is TaskState.OPEN for task in problem.task_ids]
-    ended = [
-        (row_of[uav], column_of[task], completed_s)
-        for completed_s, _, task, uav in board.ended
-        if uav in row_of and task in column_of
-    ]
-    if ended:
-        rows, columns = (np.array([each[axis] for each in ended]) for axis in (0, 1))
-        completed_s = np.array([each[2] for each in ended])
-        state.free_s[rows] = completed_s  # of several the last one counts
-        state.place_enu_m[rows] = problem.task_enu_m[columns]
-        np.multiply.at(state.survived, rows, problem.survival[rows, columns])  # one by one
+    state, open_ = board.attempts.team(problem), board.open
+    state.open[:] = [task in open_ for task in problem.task_ids]
     return state
 
 

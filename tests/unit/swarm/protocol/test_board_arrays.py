@@ -107,10 +107,13 @@ def test_the_team_stands_where_its_attempts_taken_one_by_one_leave_it(seed: int)
     random = Random(seed)
     fleet = [uav(f"u{row}", east_m=random.random()) for row in range(3)]
     posted = [entry(f"t{k}", random.random(), random.randint(0, 3)) for k in range(6)]
-    said = [message(COORDINATOR, replace(brief(*fleet), survival_default=0.9), 1)]
-    said += [message(COORDINATOR, each, 2 + row) for row, each in enumerate(posted)]
-    board = board_of(*said)
+    board = board_of(message(COORDINATOR, replace(brief(*fleet), survival_default=0.9), 1))
+    withdrawn = replace(posted[0], withdrawn=True)
+    told = [*((2 * row, each) for row, each in enumerate(posted)), (8, withdrawn)]
     for counter in range(12):
+        for said, (when, each) in enumerate(told):
+            if when == counter:
+                board.replica.join(message(COORDINATOR, each, 2 + said))
         ended = done(f"t{random.randint(0, 6)}", completed_s=float(random.randint(0, 4)))
         board.replica.join(message(f"u{random.randint(0, 2)}", ended, counter + 1))
         problem = board.problem
