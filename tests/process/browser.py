@@ -33,7 +33,7 @@ class Watched:
         self.page.on("console", self._hear)
         self.page.on("pageerror", lambda error: self.faults.append(str(error)))
         self.page.on("request", self._see)
-        self.page.goto(url, timeout=LOAD_MS)
+        self.page.goto(url)
 
     def _hear(self, message: ConsoleMessage) -> None:
         if message.type == "error" and "/feed' failed" not in message.text:
@@ -61,6 +61,7 @@ def open_page(url: str) -> Iterator[Watched]:
             context = browser.new_context(
                 viewport={"width": 1440, "height": 900}, reduced_motion="reduce"
             )
+            context.set_default_timeout(LOAD_MS)
             yield Watched(context, url)
         finally:
             browser.close()

@@ -22,12 +22,13 @@ from tests.process.pace import pace
 pytestmark = [pytest.mark.process]
 
 UAVS = ["uav1", "uav2", "uav3"]
-SIDE = 12
-"""Tasks in a row, and rows of them: enough that none but an abort ends the mission."""
+SIDE = 18
+"""Tasks in a row, and rows of them: enough that none but an abort ends the mission, which would
+take three minutes otherwise."""
 MISSION = Mission(
     "watched",
     9000.0,
-    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 3.0) for n, u in enumerate(UAVS)),
+    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 1.5) for n, u in enumerate(UAVS)),
     tuple(
         Task(TaskId(f"t{n + 1}"), (10.0 * (n % SIDE - 4), 10.0 * (1 + n // SIDE), 0.0), 1.0)
         for n in range(SIDE * SIDE)
