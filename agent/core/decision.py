@@ -12,14 +12,21 @@ what is done with the decision (agent.core.tasking).
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
 import numpy as np
 
 from agent.core.context import AgentContext, AgentPart
-from swarm.allocation.lower_level import Decision, Rule, ScoringRule, TeamState, decisions
+from swarm.allocation.lower_level import (
+    Decision,
+    IdlingRule,
+    Rule,
+    ScoringRule,
+    TeamState,
+    decisions,
+)
 from swarm.allocation.problem import IntArray, Problem
 from swarm.allocation.rules import GuidedRule
 from swarm.protocol.board import TaskBoard, after_outcomes, claim_strength, finish_claim, ranks
@@ -203,6 +210,14 @@ class RecordingRule:
         if uav == self._uav:
             self._state = state.copy()
         return self._rule.decide(problem, state, rank, uav)
+
+    def count_idle(
+        self, problem: Problem, state: TeamState, rank: IntArray, uavs: Sequence[int]
+    ) -> int:
+        """Whatever the rule says, where it says anything."""
+        if not isinstance(self._rule, IdlingRule):
+            return 0
+        return self._rule.count_idle(problem, state, rank, uavs)
 
     def valued(self, problem: Problem, decision: Decision) -> tuple[tuple[int, float], ...]:
         """Tasks that ``decision`` chose from, with their scores: what it took, then best first."""

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from heapq import heapify, heappop, heappush
+from itertools import takewhile
 from math import isfinite
 from typing import Protocol, runtime_checkable
 
@@ -145,6 +146,18 @@ class ScoringRule(Rule, Protocol):
 
 
 @runtime_checkable
+class IdlingRule(Rule, Protocol):
+    """A rule that tells of many UAVs at once that they take nothing."""
+
+    def count_idle(
+        self, problem: Problem, state: TeamState, rank: IntArray, uavs: Sequence[int]
+    ) -> int:
+        """How many of ``uavs``, free at one time and asked in this order, `decide` surely gives
+        nothing before the first that it may give a task.
+        """
+
+
+@runtime_checkable
 class CompiledRule(ScoringRule, Protocol):
     """A rule that the kernels know, so that they can run the whole lower level by it."""
 
@@ -184,7 +197,13 @@ def decisions(
         if state.active[uav] and isfinite(free_s)
     ]
     heapify(queue)
+    idling = rule if isinstance(rule, IdlingRule) else None
     while queue:
+        if idling is not None and (turns := _before(last, queue)):
+            for _ in range(idling.count_idle(problem, state, rank, turns)):
+                heappop(queue)
+            if not queue:
+                return
         _, place, uav = heappop(queue)
         decision = rule.decide(problem, state, rank, uav)
         if decision is not None:
@@ -195,6 +214,17 @@ def decisions(
         # Who takes none has no further decision, as tasks only close.
         if uav == last:
             return
+
+
+def _before(last: int | None, queue: Sequence[tuple[float, int, int]]) -> list[int]:
+    """UAVs of a heap that are free at its earliest time, in turn, if several; none from ``last``
+    on.
+    """
+    free_s = queue[0][0]
+    if len(queue) == 1 or free_s not in [each[0] for each in queue[1:3]]:
+        return []
+    turns = [uav for _, _, uav in sorted(each for each in queue if each[0] == free_s)]
+    return turns if last is None else list(takewhile(lambda uav: uav != last, turns))
 
 
 def next_decision(

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 from weakref import ReferenceType, ref
 
 import numpy as np
@@ -17,7 +18,7 @@ from swarm.allocation.index_rules import INDEX_RULES, IndexRule
 from swarm.allocation.lower_level import Decision, TeamState
 from swarm.allocation.problem import BoolArray, IntArray, Problem
 from swarm.kernels.lower_level import GREEDY, LOOKAHEAD, RuleCode, decide, valued
-from swarm.kernels.rollout import GuidedChoice, guided_choice
+from swarm.kernels.rollout import GuidedChoice, count_idle, guided_choice
 from swarm.kernels.routes import ListArrays, TeamArrays
 
 _CODES: dict[str, RuleCode] = {"greedy": GREEDY, "lookahead": LOOKAHEAD}
@@ -130,6 +131,21 @@ class GuidedRule:
             second_score=choice.second_worth,
             valued=choice.valued,
         )
+
+    def count_idle(
+        self, problem: Problem, state: TeamState, rank: IntArray, uavs: Sequence[int]
+    ) -> int:
+        """How many of ``uavs``, free at one time, take nothing before the first that may."""
+        self._look_up(problem)
+        listed = np.zeros(problem.n_uav, dtype=np.bool_)
+        listed[self._owner[state.open & (self._owner >= 0)]] = True
+        asked = list(takewhile(lambda uav: not listed[uav], uavs))
+        if not asked:
+            return 0
+        now_s = float(state.free_s[asked[0]])
+        active = state.active & ~_has_declined(state, rank, now_s, int(rank[asked[0]]))
+        active[asked] = True
+        return count_idle(team_arrays(problem, state, active, now_s), self._routes, asked)
 
     def worth(self, problem: Problem, state: TeamState, rank: IntArray, uav: int) -> float:
         """J to go of the whole team when ``uav`` has its turn [value·s]; the score of `decide`."""

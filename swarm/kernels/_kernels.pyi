@@ -240,6 +240,31 @@ MOST_UNCERTAIN_TASKS: int = 16
 def optimum(
     problem: KernelProblem, worst: bool, threads: int, should_stop: object | None = None
 ) -> tuple[float, list[list[int]]]: ...
+def count_idle(
+    problem: KernelProblem,
+    free_s: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    place_m: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    survived: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    active: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    flat: Annotated[
+        NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    offsets: Annotated[
+        NDArray[numpy.int64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    open: Annotated[
+        NDArray[numpy.bool_], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    uavs: Sequence[int],
+) -> int: ...
 def guided_choice(
     problem: KernelProblem,
     free_s: Annotated[

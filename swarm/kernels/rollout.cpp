@@ -131,6 +131,47 @@ std::vector<int> near_uavs(const Solution& solution, int uav) {
   return uavs;
 }
 
+// What J loses if `task` is taken off its list.
+double loss_without(const Solution& solution, int task) {
+  const int uav = solution.uav_of(task);
+  if (uav < 0) return 0.0;
+  const int place = solution.place_of(task);
+  double rest = 0.0;
+  if (place + 1 < static_cast<int>(solution.route(uav).size())) {
+    const int next = solution.route(uav)[place + 1];
+    const double sooner_s =
+        solution.completion_s(uav, place + 1) - solution.reach_s(uav, place, next);
+    rest = solution.tail_worth(uav, place + 1) + sooner_s * solution.tail_slope(uav, place + 1);
+  }
+  return solution.survived_before(uav, place) * (solution.tail_worth(uav, place) - rest);
+}
+
+// Tells of UAVs with nothing on their lists whether one task would be worth more there. In a team
+// that a search takes in as a whole nobody idles before it has been searched for.
+class Openings {
+ public:
+  Openings(const Solution& solution, const std::vector<int>& open)
+      : solution_(solution), enough_(kTie / 2.0 * std::abs(solution.total())) {
+    for (const int task : open) offered_.emplace_back(task, loss_without(solution, task));
+  }
+
+  // `declined` of the allowed UAVs have had their turn already, and took nothing.
+  bool idles(int uav, std::size_t declined = 0) const {
+    if (solution_.allowed().size() - declined <= kMostSearched) return false;
+    if (!solution_.route(uav).empty()) return false;
+    return std::none_of(offered_.begin(), offered_.end(), [&](const auto& offer) {
+      const auto& [task, loss] = offer;
+      return solution_.capable(uav, task) &&
+             solution_.insertion_gain(uav, 0, task) - loss > enough_;
+    });
+  }
+
+ private:
+  const Solution& solution_;
+  const double enough_;  // half of what is a reason to leave the lists, as sums here are rounded
+  std::vector<std::pair<int, double>> offered_;  // open tasks, and what their lists lose
+};
+
 void improve_briefly(Solution& solution, const std::vector<int>& uavs) {
   Watch budget(kMostSteps);
   improve(solution, uavs, budget);
@@ -158,7 +199,8 @@ GuidedChoice guided_choice(const Problem& problem, const Start& start,
   Solution solution(problem, start);
   for (const int other : solution.allowed()) solution.set_route(other, lists[other]);
   place_missing(solution, open);
-  if (iterations > 0) reconsider(solution, uav, iterations);
+  const bool idles = solution.route(uav).empty() && Openings(solution, open).idles(uav);
+  if (iterations > 0 && !idles) reconsider(solution, uav, iterations);
   GuidedChoice choice;
   const double total = solution.total();
   const Route& own = solution.route(uav);
@@ -185,7 +227,30 @@ GuidedChoice guided_choice(const Problem& problem, const Start& start,
   return choice;
 }
 
+int count_idle(const Problem& problem, const Start& start, const std::vector<Route>& lists,
+               const std::vector<int>& open, const std::vector<int>& uavs) {
+  Solution solution(problem, start);
+  for (const int other : solution.allowed()) solution.set_route(other, lists[other]);
+  place_missing(solution, open);
+  const Openings openings(solution, open);
+  std::size_t count = 0;
+  while (count < uavs.size() && openings.idles(uavs[count], count)) ++count;
+  return static_cast<int>(count);
+}
+
 void bind_rollout(nb::module_& module) {
+  module.def(
+      "count_idle",
+      [](const Problem& problem, const Vector& free_s, const Matrix& place_m,
+         const Vector& survived, const Mask& active, const Indices& flat, const Indices& offsets,
+         const Mask& open, const std::vector<int>& uavs) {
+        const StartArrays arrays{free_s, place_m, survived, active};
+        const Routes lists = ListArrays{flat, offsets}.routes();
+        const nb::gil_scoped_release released;
+        return count_idle(problem, arrays.start(problem, false), lists, open_tasks(open), uavs);
+      },
+      nb::arg("problem"), nb::arg("free_s"), nb::arg("place_m"), nb::arg("survived"),
+      nb::arg("active"), nb::arg("flat"), nb::arg("offsets"), nb::arg("open"), nb::arg("uavs"));
   module.def(
       "guided_choice",
       [](const Problem& problem, const Vector& free_s, const Matrix& place_m,

@@ -16,10 +16,15 @@ struct GuidedChoice {
   std::vector<std::pair<int, double>> valued;  // tasks with their worth: that one, then best first
 };
 
-// Lists name open tasks only. `iterations` > 0 searches around the deciding UAV; otherwise the
-// choice is between the lists as they are and other first tasks.
+// Lists name open tasks only. `iterations` > 0 searches around the deciding UAV unless it idles, as
+// `count_idle` has it; otherwise the choice is between the lists as they are and other first tasks.
 GuidedChoice guided_choice(const Problem& problem, const Start& start,
                            const std::vector<Route>& lists, const std::vector<int>& open, int uav,
                            long iterations);
+
+// How many of these UAVs, one after the other, have no task on their lists, nor one that would be
+// worth more there. Each then takes nothing, and leaves the lists as they are for the next.
+int count_idle(const Problem& problem, const Start& start, const std::vector<Route>& lists,
+               const std::vector<int>& open, const std::vector<int>& uavs);
 
 }  // namespace peckorder

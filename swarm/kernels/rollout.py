@@ -47,7 +47,8 @@ def guided_choice(
     more; so, over a sequence of decisions in which nothing unforeseen happens, J never falls below
     that of the lists. With more, the lists of the UAVs around, some 80 tasks in all, are improved
     first by that many steps of the route optimiser, with a bounded number of steps of local search
-    before and after; the choice is the first task of the UAV's improved list.
+    before and after; the choice is the first task of the UAV's improved list. A UAV that idles, as
+    `count_idle` has it, is not searched for.
 
     Of up to 150 tasks those on no list are inserted where J gains most. Beyond, only places beside
     the ten nearest tasks on lists, and fronts as near, are compared.
@@ -79,4 +80,35 @@ def guided_choice(
         None if np.isnan(second) else second,
         planned if planned >= 0 else None,
         tuple(valued),
+    )
+
+
+def count_idle(
+    team: TeamArrays, lists: Sequence[Sequence[int]] | ListArrays, uavs: Sequence[int]
+) -> int:
+    """How many UAVs idle, asked one after the other, before the first that may not.
+
+    A UAV idles if, with all missing tasks inserted, it has none on its list, and no single task
+    would be worth more there than where it is. `guided_choice` then finds nothing for it, and since
+    no task was to be its own, the choices of the others are the same without it. So one placing of
+    tasks tells of all of them. Of the last 12 UAVs that are counted upon nobody idles: a search
+    takes in all of them.
+
+    Args:
+        team: mission and state.
+        lists: as for `guided_choice`.
+        uavs: indices in the order of their turns; active, and free at one time.
+
+    Raises:
+        ValueError: names the argument that is wrong.
+    """
+    active = np.asarray(team.active)
+    if not all(0 <= uav < team.problem.n_uav and active[uav] for uav in uavs):
+        raise ValueError(f"uavs must be indices of active UAVs, not {list(uavs)}")
+    return _kernels.count_idle(
+        team.problem,
+        *team.arguments(),
+        *open_lists(team, lists),
+        np.asarray(team.open),
+        list(uavs),
     )

@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,9 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.allocation import Problem, TeamState, evaluate, run
-from swarm.allocation.lower_level import Decision
+from swarm.allocation.lower_level import Decision, decisions
+from swarm.allocation.problem import IntArray
 from swarm.allocation.rules import GuidedRule, team_arrays, team_at_start
-from swarm.kernels.rollout import guided_choice
+from swarm.kernels.rollout import count_idle, guided_choice
 from swarm.kernels.routes import ListArrays, optimise_routes
 from tests.support.problems import any_problem, random_problem
 from tests.support.reference import repaired, team_worth
@@ -202,3 +204,105 @@ def test_a_wrong_call_is_refused() -> None:
         guided_choice(team, [[], []], 0, iterations=-1)
     with pytest.raises(ValueError, match="lists"):
         guided_choice(team, [[]], 0)
+
+
+class AskedOneByOne:
+    """A rule whose idle UAVs are not passed over."""
+
+    def __init__(self, rule: GuidedRule) -> None:
+        self.name = rule.name
+        self._rule = rule
+        self.asked = 0
+
+    def decide(
+        self, problem: Problem, state: TeamState, rank: IntArray, uav: int
+    ) -> Decision | None:
+        self.asked += 1
+        return self._rule.decide(problem, state, rank, uav)
+
+
+class PassedOver(AskedOneByOne):
+    def count_idle(
+        self, problem: Problem, state: TeamState, rank: IntArray, uavs: Sequence[int]
+    ) -> int:
+        return self._rule.count_idle(problem, state, rank, uavs)
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    seed=SEEDS,
+    n_uav=st.integers(2, 25),
+    n_task=st.sampled_from((1, 5, 30, 160)),
+    last=st.none() | st.integers(0, 24),
+)
+def test_idle_uavs_are_passed_over_exactly_where_they_would_take_nothing(
+    seed: int, n_uav: int, n_task: int, last: int | None
+) -> None:
+    rng = np.random.default_rng(seed)
+    problem = random_problem(rng, n_uav, n_task, lowest_survival=rng.choice((0.8, 1.0)))
+    lists = any_lists(problem, rng, left_out=0.5)
+    lists[n_uav // 2 :] = [[] for _ in lists[n_uav // 2 :]]
+    state, rank = TeamState.at_start(problem), rng.permutation(n_uav)
+    state.open &= rng.uniform(size=n_task) < rng.uniform()
+    state.active &= rng.uniform(size=n_uav) < 0.9
+    state.free_s[:] = np.where(rng.uniform(size=n_uav) < 0.6, 1.0, rng.uniform(1.0, 3.0, n_uav))
+    one_by_one, passed_over = (
+        kind(rule_of(problem, lists, repair_iterations=20)) for kind in (AskedOneByOne, PassedOver)
+    )
+
+    expected = list(decisions(problem, state, rank, one_by_one, last))
+
+    assert list(decisions(problem, state, rank, passed_over, last)) == expected
+    assert passed_over.asked <= one_by_one.asked
+
+
+def test_of_many_idle_uavs_only_those_that_may_take_something_are_asked() -> None:
+    rng = np.random.default_rng(7)
+    problem = random_problem(rng, 40, 12, horizon_s=30.0)
+    lists = [list(range(12)), *([] for _ in range(39))]
+    state = TeamState.at_start(problem)
+    state.open[:] = np.arange(12) == 3
+    state.place_enu_m[0] = problem.task_enu_m[3]
+    state.place_enu_m[1:] += 1000.0  # too far for anything before the end
+    rule = PassedOver(rule_of(problem, lists))
+
+    taken = list(decisions(problem, state, np.arange(40)[::-1], rule))
+
+    assert [(each.uav, each.task) for each in taken] == [(0, 3)]
+    assert rule.asked == 13  # the last twelve, one of which takes it, and is asked once more
+
+
+@settings(deadline=None, max_examples=60)
+@given(seed=SEEDS, n_uav=st.integers(10, 16), n_task=st.integers(1, 15))
+def test_a_uav_idles_if_no_task_is_worth_more_as_its_only_one(
+    seed: int, n_uav: int, n_task: int
+) -> None:
+    rng = np.random.default_rng(seed)
+    problem = any_problem(seed, n_uav, n_task)
+    lists = any_lists(problem, rng, left_out=0.3)
+    lists[0] = []
+    state = TeamState.at_start(problem)
+    state.open &= rng.uniform(size=n_task) < 0.7
+    team = team_arrays(problem, state, state.active, 0.0)
+    kept = [[task for task in route if state.open[task]] for route in lists]
+    placed = repaired(problem, state, kept)
+    worth = team_worth(problem, state, placed)
+    moved = []
+    for task in np.flatnonzero(state.open & problem.capable[0]):
+        others = [[t for t in route if t != task] for route in placed[1:]]
+        moved.append(team_worth(problem, state, [[int(task)], *others]))
+
+    idles = not placed[0] and max(moved, default=worth) <= worth + 1e-9 * abs(worth)
+    idles &= n_uav > 12
+
+    assert count_idle(team, lists, [0]) == idles
+
+
+def test_those_asked_must_take_part() -> None:
+    problem = random_problem(np.random.default_rng(1), 3, 4)
+    state = TeamState.at_start(problem)
+    state.active[1] = False
+    team = team_arrays(problem, state, state.active, 0.0)
+    for uavs in ([1], [0, 3], [-1]):
+        with pytest.raises(ValueError, match="uavs must be indices of active UAVs"):
+            count_idle(team, [[], [], []], uavs)
