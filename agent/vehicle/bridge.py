@@ -37,7 +37,16 @@ from agent.vehicle.conversation import BridgeAction
 from agent.vehicle.firmware import firmware_of
 from agent.vehicle.hand_over import HandOver, HandOverReason, LinkLoss, hand_over
 from agent.vehicle.landing import Landing
-from agent.vehicle.messages import CommandAck, DecodedMessage, GroundHeartbeat, Heartbeat, Position
+from agent.vehicle.messages import (
+    BatteryStatus,
+    CommandAck,
+    DecodedMessage,
+    GroundHeartbeat,
+    Heartbeat,
+    Inbound,
+    Position,
+    SystemStatus,
+)
 from agent.vehicle.obedience import obey
 from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning
@@ -50,6 +59,7 @@ from agent.vehicle.session import (
     VehicleSession,
 )
 from agent.vehicle.signing import Signing
+from agent.vehicle.standing import Standing
 from agent.vehicle.state import PositionNews
 from agent.vehicle.supervision import intervention
 from agent.vehicle.transitions import follow, follow_mission
@@ -162,8 +172,17 @@ class Bridge:
             case _:
                 session.vehicle.on_message(message, session.now_s)
                 session.on_message(message)
+                self._heed_charge(message)
         self._activity.on_message(message)
         self._settle()
+
+    def _heed_charge(self, message: Inbound) -> None:
+        """Take what is known of the batteries each time that more is told."""
+        session = self._session
+        frac = session.vehicle.charge.frac
+        if isinstance(message, SystemStatus | BatteryStatus) and frac is not None:
+            session.tells_charge = True
+            session.safety.on_charge(frac)
 
     def _settle(self) -> None:
         """Go on with what follows, if the activity has ended."""
@@ -252,7 +271,7 @@ class Bridge:
         fault = session.firmware.position_fault(session.vehicle) if session.firmware else None
         session.place_enu_m = place_enu_m
         session.safety.on_position(place_enu_m, fault, session.now_s)
-        velocity, battery_frac = position.velocity_enu_m_s, session.vehicle.battery_frac
+        velocity, battery_frac = position.velocity_enu_m_s, session.vehicle.charge.frac
         session.report(Telemetry(place_enu_m, velocity, battery_frac))
         if fault is None:  # nothing is judged by a place that the vehicle itself distrusts
             session.position_filter.on_position(place_enu_m, session.now_s)
@@ -265,7 +284,7 @@ class Bridge:
         """Forget what is no longer true of an autopilot that began anew."""
         if self._activity.in_our_hands:
             self._activity = hand_over(self._session, "the autopilot rebooted")
-        elif isinstance(self._activity, HandOver | Preparing):
+        elif isinstance(self._activity, HandOver | Preparing | Standing):
             self._activity.on_reboot()
         self._session.forget_vehicle()
         self._streams = None

@@ -58,6 +58,7 @@ _FRAME_BY_WIRE = {
     3: AltitudeFrame.HOME,
     6: AltitudeFrame.HOME,
 }
+_LIFTS_NOTHING = (mavlink.MAV_BATTERY_FUNCTION_AVIONICS, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD)
 _LANDED_BY_WIRE = {int(state): state for state in LandedState}
 
 
@@ -305,7 +306,8 @@ def _system_status(raw: Any) -> Inbound | None:
 
 
 def _battery(raw: Any) -> Inbound | None:
-    return BatteryStatus(_battery_frac(raw.battery_remaining)) if raw.id == 0 else None
+    lifts = raw.battery_function not in _LIFTS_NOTHING
+    return BatteryStatus(_battery_frac(raw.battery_remaining), raw.id, lifts)
 
 
 def _extended_state(raw: Any) -> Inbound | None:

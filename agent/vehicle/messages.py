@@ -74,9 +74,12 @@ class SystemStatus:
 
 @dataclass(frozen=True, slots=True)
 class BatteryStatus:
-    """BATTERY_STATUS of the first battery."""
+    """BATTERY_STATUS of one battery."""
 
     battery_frac: float | None
+    number: int = 0
+    lifts: bool = True
+    """Whether the vehicle flies on it: it is none of avionics or payload alone."""
 
 
 @dataclass(frozen=True, slots=True)

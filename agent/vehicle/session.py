@@ -83,6 +83,8 @@ class VehicleSession(Conversation):
         """Where not to fly."""
         self.launched_enu_m: Point | None = None
         """Where it took off on our order, to which its return mode leads; None: not known."""
+        self.tells_charge = False
+        """Whether it has ever told the charge of its batteries."""
         self.cruise_watch = CruiseWatch()
         self.place_enu_m = (math.nan, math.nan, math.nan)
         """Where the vehicle is, by its newest position [m; mission origin]."""

@@ -1,8 +1,11 @@
 """A vehicle on the ground between two flights: its battery is changed, and then it may start again.
 
 Nobody starts it as long as a person may stand beside it: that is said by the operator's word
-alone, unless it is simulated, and by a battery that is full. To change a battery is to switch the
-autopilot off and on: it may fall silent and begin anew meanwhile, and nothing follows from that.
+alone, unless it is simulated, and by a battery that is full. The word is about the vehicle as it
+stands there: it is taken back where the battery that is in it will not do, as somebody has to go
+there again then, and where somebody is seen to have switched it off and on or to have armed it
+since. To change a battery is to switch the autopilot off and on: it may fall silent and begin anew
+before the word, and nothing follows from that.
 It departs as it did first: all checks, motors, take-off, speed, its way home where that stands on
 it; see `agent.vehicle.preparation`.
 """
@@ -15,6 +18,11 @@ from agent.core.interface import GoTo, Prepare, Swap
 from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.preparation import Preparing
 from agent.vehicle.session import VehicleSession
+from swarm.protocol.operator_commands import NOT_READY
+
+_ARMED = "armed by somebody else: disarm it"
+
+_LET_START = "and then let it start again: swarm ready"
 
 _ASTRAY_M = 25.0
 """Who stands farther than that from where it was to land stands elsewhere: whoever changes its
@@ -47,6 +55,12 @@ class Standing(Activity):
         self.taken: str | None = None
         """Who flies it away, in words; None as long as it stands."""
         self._told_ready = False
+        self._unheard = False
+        """Whether it was not heard when somebody let it start: it is going to boot, then."""
+        self._let_s = -math.inf
+        """When somebody let it start; what was told of its charge before may be of another one."""
+        self._refusal: str | None = None
+        """Why the last word was taken back."""
         session.tell_anew()
 
     def has_news(self) -> bool:
@@ -61,7 +75,20 @@ class Standing(Activity):
 
     def let_start(self) -> None:
         """A person has seen to it."""
-        self.may_start = True
+        self.may_start, self._refusal, self._let_s = True, None, self._session.now_s
+        self._unheard = self._session.missing() is not None
+
+    def on_reboot(self) -> None:
+        """The autopilot began anew: somebody stands beside it, unless that is over already."""
+        if self._unheard:
+            self._unheard = False
+        else:
+            self._take_back(None)
+
+    def _take_back(self, refusal: str | None) -> None:
+        """Whoever let it start has to do so again."""
+        self.may_start = self.is_ready = self._told_ready = False
+        self._refusal = refusal
 
     def advance(self) -> None:
         """Look whether it may take off, and say what is waited for."""
@@ -71,15 +98,21 @@ class Standing(Activity):
             self._session.firmware,
         )
         if heartbeat is not None and heartbeat.armed and not session.silent:
-            self.may_start = False  # whoever armed it may stand beside it
+            # Whoever armed it may stand beside it.
+            self._take_back(_ARMED if self.may_start else self._refusal)
             if firmware is not None and firmware.airborne(session.vehicle):
                 self.taken = f"its pilot flies it in {firmware.mode_name(heartbeat.custom_mode)}"
         if self.is_ready and (heartbeat is None or not heartbeat.armed):
             return
         reason = self._waits_for()
         self.is_ready = reason is None
-        if reason is not None:
-            session.tell_not_ready(reason)
+        if reason is None:
+            self._unheard = False
+            return
+        if self.may_start and not session.config.ready_by_itself and self._objection() is not None:
+            self._take_back(reason)
+        refused = self._refusal is not None and not self.may_start
+        session.tell_not_ready(f"{NOT_READY}{self._refusal}" if refused else reason)
 
     def _waits_for(self) -> str | None:
         """What is missing, in words; None if it may take off."""
@@ -90,22 +123,44 @@ class Standing(Activity):
             if session.now_s < self.since_s + self.order.swap_s:
                 return changing
         elif not self.may_start:
-            return "change its battery, and then let it start again: swarm ready"
+            return f"change its battery, {_LET_START}"
         if (missing := session.missing()) is not None or heartbeat is None or firmware is None:
             return f"{changing}: {missing}"
         if heartbeat.armed:
-            return "armed by somebody else: disarm it"
-        if not vehicle.prearm_heard:
-            return "waiting to hear its charge (SYS_STATUS)"
-        charge_frac, full_frac = vehicle.battery_frac, config.full_battery_frac
+            return _ARMED
+        if not vehicle.prearm_heard or (session.tells_charge and not self._charge_is_known):
+            return "waiting to hear its charge"
+        if objection := self._objection():
+            return objection
+        return None if session.known_place_m() is not None else "waiting for a position"
+
+    @property
+    def _charge_is_known(self) -> bool:
+        """Whether its charge was told since somebody let it start."""
+        charge = self._session.vehicle.charge
+        told_s = -math.inf if charge.told_at_s is None else charge.told_at_s
+        return charge.frac is not None and told_s > self._let_s
+
+    def _objection(self) -> str | None:
+        """Why somebody has to see to it, whatever was said, in words; None: nothing is known."""
+        session, (east_m, north_m, up_m) = self._session, self.order.position_enu_m
+        charge_frac, full_frac = session.vehicle.charge.frac, session.config.full_battery_frac
+        if session.missing() is not None or (session.tells_charge and not self._charge_is_known):
+            return None
         if charge_frac is not None and charge_frac < full_frac:
             return f"battery at {charge_frac:.0%}, below the {full_frac:.0%} of a full one"
         place_enu_m = session.known_place_m()
         if place_enu_m is None:
-            return "waiting for a position"
-        astray_m = math.dist(place_enu_m[:2], self.order.position_enu_m[:2])
+            return None
+        astray_m = math.dist(place_enu_m[:2], (east_m, north_m))
         if astray_m > _ASTRAY_M:
             return f"it stands {astray_m:.0f} m from its base: carry it there"
+        above_m = place_enu_m[2] - up_m
+        if abs(above_m) > session.config.home_tolerance_m:
+            return (
+                f"its height is {above_m:+.0f} m off that of its base: restart it, "
+                "or correct [origin] alt_m, or position_m of the base"
+            )
         return None
 
 

@@ -12,6 +12,7 @@ from collections import deque
 from dataclasses import dataclass, field
 from enum import Enum, auto
 
+from agent.vehicle.charge import ChargeMeter
 from agent.vehicle.messages import (
     BatteryStatus,
     EkfStatus,
@@ -84,7 +85,7 @@ class VehicleState:
     """Whether it minds a fence of its own."""
     ekf_flags: int | None = None
     landed: LandedState = LandedState.UNDEFINED
-    battery_frac: float | None = None
+    charge: ChargeMeter = field(default_factory=ChargeMeter)
     _warnings: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=_WARNINGS))
     """The autopilot's last warnings, and when each came."""
     _newest_boot_s: float | None = None
@@ -137,10 +138,10 @@ class VehicleState:
                 self.prearm_ok = message.prearm_ok
                 self.prearm_healthy = message.prearm_healthy
                 self.prearm_heard = True
-                self.battery_frac = message.battery_frac
+                self.charge.on_system(message.battery_frac, now_s, armed=self.armed)
                 self.fence_enabled = message.fence_enabled
-            case BatteryStatus(battery_frac) if battery_frac is not None:
-                self.battery_frac = battery_frac
+            case BatteryStatus(battery_frac, number, lifts=True):
+                self.charge.on_battery(number, battery_frac, now_s, armed=self.armed)
             case EkfStatus(flags):
                 self.ekf_flags = flags
             case ExtendedState(landed):

@@ -14,7 +14,7 @@ from collections import deque
 
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
-from agent.vehicle.messages import BatteryStatus, Heartbeat, Inbound, SystemStatus
+from agent.vehicle.messages import Heartbeat, Inbound
 from agent.vehicle.state import VehicleState
 
 TERMINATED = "the flight was terminated"
@@ -138,16 +138,15 @@ class SafetyMonitor:
     # What is heard.
 
     def on_message(self, message: Inbound, now_s: float) -> None:
-        """Take a reading of the battery, or a sign of life."""
-        match message:
-            case SystemStatus(battery_frac=float(frac)) | BatteryStatus(battery_frac=float(frac)):
-                self._readings.append(frac)
-            case Heartbeat():
-                self._heartbeats += 1
-                if self._position_at_s is None:
-                    self._position_at_s = now_s  # from now on one is missing
-            case _:
-                pass
+        """Take a sign of life."""
+        if isinstance(message, Heartbeat):
+            self._heartbeats += 1
+            if self._position_at_s is None:
+                self._position_at_s = now_s  # from now on one is missing
+
+    def on_charge(self, frac: float) -> None:
+        """Take a reading of the battery."""
+        self._readings.append(frac)
 
     def on_position(
         self, place_enu_m: tuple[float, float, float], fault: str | None, now_s: float

@@ -16,6 +16,8 @@ BEING_STOPPED = "being stopped, "
 """Begins the note of a held UAV whose vehicle has not been seen to stand yet."""
 CANNOT_HOLD = "cannot hold: "
 """Begins the note of a held UAV whose vehicle goes on."""
+NOT_READY = "not ready: "
+"""Begins the note of a UAV on the ground that must not start, though the operator said it may."""
 
 _WORDS = {
     CommandKind.HOLD: "held by the operator",

@@ -223,7 +223,7 @@ class VehicleListener:
     def _readiness(self, name: str, flavour: Firmware) -> CheckFinding:
         state = self._state
         what = f"{name} ready"
-        charge = state.battery_frac
+        charge = state.charge.frac
         battery = "" if charge is None else f", battery {charge:.0%}"
         problem = self._unready(flavour)
         if problem == _BOOTING:

@@ -92,9 +92,109 @@ def test_the_word_alone_does_not_start_it_on_an_empty_battery(fake: type[FakeCop
     flight.run(30.0)
 
     assert Swapped(3) not in flight.reports
-    assert "battery at 30%, below the 90% of a full one" in flight.reasons()
+    assert flight.reasons()[-1] == "not ready: battery at 30%, below the 90% of a full one"
     assert isinstance(flight.order(GoTo(4, ABOVE))[-1], Refused)
     assert flight.bridge.phase is FlightPhase.STANDING
+
+
+@pytest.mark.parametrize("switched_off", [True, False])
+def test_a_word_that_was_refused_starts_nothing_once_the_battery_is_changed(
+    fake: type[FakeCopter], switched_off: bool
+) -> None:
+    """Whoever changes it stands beside it then."""
+    flight = landed(fake, BridgeConfig(1, ORIGIN))
+    flight.order(Ready(3))
+    flight.run(5.0)
+
+    if switched_off:
+        changed(flight)
+        assert "swarm ready" in flight.reasons()[-1]
+    else:
+        flight.copter.battery_percent = 99
+    flight.run(30.0)
+    assert Swapped(3) not in flight.reports
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3), limit_s=5.0)
+
+
+def test_a_word_given_while_it_is_switched_off_or_boots_counts_for_what_it_boots_with(
+    fake: type[FakeCopter],
+) -> None:
+    for percent, starts in ((99, True), (50, False)):
+        flight = landed(fake, BridgeConfig(1, ORIGIN))
+        flight.copter.silent = True
+        flight.run(8.0)
+        flight.order(Ready(3))
+        flight.copter.power_on(flight.now_s)
+        flight.copter.silent, flight.copter.battery_percent = False, percent
+        flight.run(30.0)
+
+        assert (Swapped(3) in flight.reports) is starts
+        told = "not ready: battery at 50%, below the 90% of a full one"
+        assert (told in flight.reasons()) is not starts
+
+
+def test_one_that_is_switched_off_after_the_word_needs_another(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN), percent=99)
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3))
+    changed(flight)
+    flight.run(20.0)
+
+    assert isinstance(flight.order(GoTo(4, ABOVE))[-1], Refused)
+    flight.run(20.0)
+    assert not flight.copter.count()[ARM]
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3))
+
+
+def test_one_that_tells_no_charge_any_more_waits_until_it_is_told(fake: type[FakeCopter]) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN))
+    flight.copter.battery_percent = -1
+    flight.run(2.0)
+    flight.order(Ready(3))
+    flight.run(30.0)
+    assert Swapped(3) not in flight.reports
+    assert flight.reasons()[-1] == "waiting to hear its charge"
+
+    flight.copter.battery_percent = 95
+    flight.run_until(Swapped(3), limit_s=5.0)
+
+
+def test_one_that_never_told_its_charge_starts_by_the_word_alone(fake: type[FakeCopter]) -> None:
+    copter = fake(ORIGIN)
+    copter.battery_percent = -1
+    flight = BridgeFlight(copter, BridgeConfig(1, ORIGIN)).prepared()
+    flight.order(SWAP)
+    flight.run_until(Landed(3))
+    flight.order(Ready(3))
+    flight.run_until(Swapped(3), limit_s=5.0)
+
+
+@pytest.mark.parametrize(
+    ("moved_m", "why"),
+    [
+        ((40.0, 0.0, 0.0), "it stands 40 m from its base: carry it there"),
+        (
+            (0.0, 0.0, 15.0),
+            "its height is +15 m off that of its base: restart it, "
+            "or correct [origin] alt_m, or position_m of the base",
+        ),
+    ],
+    ids=["aside", "above"],
+)
+def test_one_that_stands_elsewhere_is_not_ready(
+    fake: type[FakeCopter], moved_m: tuple[float, float, float], why: str
+) -> None:
+    flight = landed(fake, BridgeConfig(1, ORIGIN), percent=99)
+    east_m, north_m, up_m = flight.copter.position_m
+    flight.copter.position_m = east_m + moved_m[0], north_m + moved_m[1], up_m + moved_m[2]
+    flight.run(30.0)
+    flight.order(Ready(3))
+    flight.run(30.0)
+
+    assert Swapped(3) not in flight.reports
+    assert flight.reasons()[-1] == f"not ready: {why}"
 
 
 def test_the_word_about_another_landing_counts_for_nothing(fake: type[FakeCopter]) -> None:
