@@ -27,7 +27,8 @@ class Prepare:
     """Height of the ground on which the vehicle stands [m; mission origin]; None if not known."""
     left_in_air: bool = False
     """An earlier life of this agent had it in the air: one that stands on the ground now came
-    down with nobody watching, and is not started."""
+    down with nobody watching, and is not started; one that still climbs goes on where it is, as
+    high above its home as the place lies above the ground."""
     acceleration_m_s2: float | None = None
     """To and from cruise speed, as the mission is planned; None: it does not say."""
 

@@ -17,7 +17,7 @@ agent.vehicle.preflight.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from agent.core.interface import Prepare
 from agent.vehicle.activity import Activity, FlightPhase
@@ -43,6 +43,7 @@ _CAME_DOWN = (
     "it was left in the air and stands on the ground now: look after it, "
     "and start its agent with --rejoin"
 )
+_NO_PLACE = "waiting for a position"
 _CLIMB_STOPPED = "the vehicle took off and then stopped climbing"
 _ARMED_BY_OTHERS = "somebody else armed it and disarmed it again; prepare it again to take off"
 _FLOWN_BY_PILOT = "its pilot flew and landed it; prepare it again to take off"
@@ -73,7 +74,8 @@ class _Preparation:
         self._mission = session.mission
         self._config = config
         self._firmware = firmware
-        _, _, self._start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
+        self._aims = order.left_in_air
+        """Whether it is still to be found out where it climbs, with nobody's order at hand."""
         self._mode = _Step(
             f"setting {firmware.commanded_mode_name}", session.repeated("mode", config.mode_tries)
         )
@@ -124,6 +126,12 @@ class _Preparation:
         """Whether takeoff was asked for."""
         return self._takeoff.command.given > 0
 
+    @property
+    def _start_alt_m(self) -> float:
+        """Height above sea level to which it climbs [m]."""
+        _, _, alt_m = wgs84_from_enu(self._config.origin, self._order.position_enu_m)
+        return alt_m
+
     def on_ended(self, ended: CommandEnded) -> None:
         """Take a command's outcome."""
         for step in (self._mode, self._arm, self._takeoff):
@@ -170,7 +178,7 @@ class _Preparation:
                     self._failsafes.ask()
                 self._session.say(*started)
         elif vehicle.position is None:
-            self.waiting_for = "waiting for a position"
+            self.waiting_for = _NO_PLACE
         elif (airborne := firmware.airborne(vehicle)) is None:
             self.waiting_for = "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
         elif objection := self._consent.objection(airborne=airborne):
@@ -237,7 +245,7 @@ class _Preparation:
             self._failsafes.ask()
         if not self._climbing or self._high_enough(position):
             self._climbing = False
-            self._settle()
+            self._settle(position)
 
     def _left_by_others(self) -> str | None:
         """Why it does not start by itself: somebody may be walking up to it."""
@@ -271,7 +279,27 @@ class _Preparation:
     def _start_fault(self, position: Position) -> str | None:
         return start_fault(self._order, position, self._config)
 
+    def _aims_at(self, position: Position) -> bool:
+        """Whether it is known where it climbs.
+
+        One that an earlier life had take off may have done so far from its start, at a base: it
+        climbs where it is, as high above its home as it would at its start.
+        """
+        order, ground_up_m = self._order, self._order.ground_up_m
+        place_enu_m = self._session.known_place_m()
+        if self._aims and place_enu_m is not None:
+            up_m = order.position_enu_m[2]
+            if ground_up_m is not None:
+                home_up_m = place_enu_m[2] - position.relative_alt_m
+                up_m = home_up_m + up_m - ground_up_m
+            aim_enu_m = (*place_enu_m[:2], up_m)
+            self._order = replace(order, position_enu_m=aim_enu_m, ground_up_m=None)
+            self._aims = False
+        return not self._aims
+
     def _take_off(self, position: Position) -> list[Outbound]:
+        if not self._aims_at(position):
+            return self._wait(_NO_PLACE)
         self._climbing = True
         self._climbed_at_s = self._session.now_s
         self._highest_m = position.alt_m
@@ -312,9 +340,13 @@ class _Preparation:
             self.failure = _CLIMB_STOPPED
         return False
 
-    def _settle(self) -> None:
+    def _settle(self, position: Position) -> None:
         """Fly to the start, unless the vehicle is resumed in the air, and set the speed."""
-        order, speed = self._order, self._speed
+        speed = self._speed
+        if self._leg is None and not self._resumes and not self._aims_at(position):
+            self.waiting_for = _NO_PLACE
+            return
+        order = self._order
         if self._leg is None and not self._resumes and not self._is_barred:
             place = (order.position_enu_m, order.speed_m_s)
             self._leg = RepositionLeg(self._session, self._firmware, *place)

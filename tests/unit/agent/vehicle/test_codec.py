@@ -133,6 +133,20 @@ def test_what_the_ground_said_in_a_recording_is_what_we_would_say() -> None:
             mavlink.MAVLink_battery_status_message(0, 0, 0, 0, [0] * 10, 0, 0, 0, -1),
             BatteryStatus(None),
         ),
+        (
+            mavlink.MAVLink_battery_status_message(2, 2, 0, 0, [0] * 10, 0, 0, 0, 40),
+            BatteryStatus(0.4, 2),
+        ),
+        *(
+            (
+                mavlink.MAVLink_battery_status_message(1, kind, 0, 0, [0] * 10, 0, 0, 0, 9),
+                BatteryStatus(0.09, 1, lifts=False),
+            )
+            for kind in (
+                mavlink.MAV_BATTERY_FUNCTION_AVIONICS,
+                mavlink.MAV_BATTERY_FUNCTION_PAYLOAD,
+            )
+        ),
         (mavlink.MAVLink_extended_sys_state_message(3, 4), ExtendedState(LandedState.LANDING)),
         (mavlink.MAVLink_command_ack_message(400, 4, 0, 0, 255, 191), CommandAck(400, 4)),
         (mavlink.MAVLink_command_ack_message(400, 4), CommandAck(400, 4)),

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.ardupilot import ArduCopter
 from agent.vehicle.firmware.px4 import Px4Copter
-from agent.vehicle.messages import BatteryStatus, Heartbeat, SystemStatus
+from agent.vehicle.messages import Heartbeat
 from agent.vehicle.state import VehicleState
 from agent.vehicle.supervision import SafetyMonitor
 from tests.support.bridge_flight import ORIGIN
@@ -16,26 +16,21 @@ from tests.support.bridge_flight import ORIGIN
 CONFIG = BridgeConfig(1, ORIGIN, fence_radius_m=100.0, fence_height_m=50.0)
 BEAT = Heartbeat(vehicle_type=2, autopilot=3, armed=True, custom_mode=4, system_status=4)
 FLAVOUR = ArduCopter()
-charges = st.one_of(st.none(), st.floats(0.0, 1.0))
 
 
 def advice(safety: SafetyMonitor, now_s: float = 0.0) -> str | None:
     return safety.advice(VehicleState(heartbeat=BEAT), FLAVOUR, now_s)
 
 
-@given(st.lists(st.tuples(charges, st.booleans()), max_size=30))
-def test_a_battery_is_low_if_its_last_five_known_readings_are_and_again_when_it_has_halved(
-    readings: list[tuple[float | None, bool]],
+@given(st.lists(st.floats(0.0, 1.0), max_size=30))
+def test_a_battery_is_low_if_its_last_five_readings_are_and_again_when_it_has_halved(
+    readings: list[float],
 ) -> None:
     safety = SafetyMonitor(CONFIG)
-    known: list[float] = []
     told_frac: float | None = None
-    for number, (frac, by_battery) in enumerate(readings):
-        safety.on_message(
-            BatteryStatus(frac) if by_battery else SystemStatus(True, True, frac), float(number)
-        )
-        known += [] if frac is None else [frac]
-        last = known[-5:]
+    for number, frac in enumerate(readings):
+        safety.on_charge(frac)
+        last = readings[: number + 1][-5:]
         low = [frac for frac in last if frac < 0.2]
         assert (safety.arming_objection(VehicleState(), float(number)) is not None) == bool(low)
         limit_frac = 0.2 if told_frac is None else told_frac / 2.0
@@ -63,7 +58,7 @@ def test_a_vehicle_is_outside_if_it_was_for_a_second_and_five_positions(
 def test_what_was_advised_in_one_flight_is_advised_again_in_the_next() -> None:
     safety = SafetyMonitor(CONFIG)
     for _ in range(5):
-        safety.on_message(BatteryStatus(0.1), 0.0)
+        safety.on_charge(0.1)
     assert advice(safety) == "battery at 10%, below the reserve of 20%"
     assert advice(safety) is None
     safety.begin()
@@ -77,7 +72,7 @@ def test_each_thing_is_advised_once_whatever_else_was() -> None:
     assert advice(safety, 5.0) == "111 m from the origin, outside the fence of 100 m"
     assert advice(safety, 5.0) is None
     for _ in range(5):
-        safety.on_message(BatteryStatus(0.1), 6.0)
+        safety.on_charge(0.1)
     assert advice(safety, 6.0) == "battery at 10%, below the reserve of 20%"
     alarmed = VehicleState(heartbeat=Heartbeat(2, 12, True, 0x3040000, 5))
     alarm = safety.advice(alarmed, Px4Copter(), 6.0)
