@@ -374,9 +374,27 @@ class BaseVisits(AgentPart):
             return False
         if claim.stage is BaseStage.PARKED and claim.sortie_end_s is not None:
             self._machine.take(Trigger.COMES_DOWN)
+            self._flights.land_beside(base, resume=True)  # it may have been on its way down
             self._wait_beside(base, claim, now_s)
         else:
             self._stay(base, claim.stage, now_s)
+        return True
+
+    def wait_where_found(self, base: BaseSpec, now_s: float) -> bool:
+        """The vehicle was found on the ground at ``base``: others may have its slot by now."""
+        if not self._machine.take(Trigger.STANDS_AT_BASE):
+            return False
+        self._machine.take(Trigger.COMES_DOWN)
+        mission_s = self._mission_view.mission_s(now_s)
+        stands = Claim(
+            *(ClaimPhase.HELD, None, mission_s, 0, mission_s),
+            base=base.id,
+            stage=BaseStage.PARKED,
+            arrives_s=mission_s,
+            sortie_end_s=mission_s,
+        )
+        self._wait_beside(base, stands, now_s)
+        self._log("stands at base", base=base.id)
         return True
 
     def stay(self, base: BaseSpec, now_s: float) -> None:

@@ -24,6 +24,10 @@ from swarm.protocol.messages import TaskEntry
 from swarm.protocol.operator_commands import zones_in_force
 
 
+_AT_BASE_M = 25.0
+"""Who is no farther from a base, or from its own spot there, is at it: agent.vehicle.standing."""
+
+
 @dataclass(frozen=True, slots=True)
 class HomeFlight:
     """The way home of a UAV, to the nearest base or its own start."""
@@ -92,6 +96,24 @@ class Flights(AgentPart):
                 brief.zone_margin_m,
             )
         return self._spots[base.id]
+
+    def base_here(self) -> BaseSpec | None:
+        """The base at which the vehicle is, by where it was told last, seen from above."""
+        brief, telemetry = self._replica.brief, self._mission_view.telemetry
+        if brief is None or telemetry is None:
+            return None
+        flat_m = telemetry.position_enu_m[:2]
+        near = [
+            (
+                min(
+                    math.dist(flat_m, place[:2]) for place in (base.position_enu_m, self.spot(base))
+                ),
+                base,
+            )
+            for base in brief.bases
+        ]
+        away_m, nearest = min(near, key=_distance, default=(math.inf, None))
+        return nearest if away_m <= _AT_BASE_M else None
 
     @property
     def land_s(self) -> float:
@@ -300,10 +322,14 @@ class Flights(AgentPart):
         """A person has seen to the vehicle, which stands at a base."""
         self._order(Ready(self.leg))
 
-    def land_beside(self, base: BaseSpec) -> None:
-        """Land at a base without taking any of its slots."""
+    def land_beside(self, base: BaseSpec, *, resume: bool = False) -> None:
+        """Land at a base without taking any of its slots; it may be down (``resume``)."""
         self.meter.land()
         self.leg += 1  # nothing is heard any more of how it came there
         above_enu_m = self._mission_view.in_layer(self.spot(base))
         reason = f"its battery is used up, and no slot of base {base.id} is free"
-        self._order(Return(reason, via_enu_m=above_enu_m, land=True))
+        self._order(Return(reason, resume, via_enu_m=above_enu_m, land=True))
+
+
+def _distance(near: tuple[float, BaseSpec]) -> float:
+    return near[0]

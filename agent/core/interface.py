@@ -202,6 +202,8 @@ class Refused:
 
     order: VehicleOrder
     reason: str
+    stands: bool = field(default=False, compare=False)
+    """The vehicle that was to be prepared stands on the ground, its motors too."""
 
 
 @dataclass(frozen=True, slots=True)

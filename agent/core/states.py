@@ -102,9 +102,19 @@ TRANSITIONS: Final[Mapping[AgentState, Mapping[Trigger, AgentState]]] = {
         **_TAKING_PART,
         _T.CLAIM_RECOVERED: _S.RESUMING,
         _T.VEHICLE_READY: _S.IDLE,
+        _T.STANDS_AT_BASE: _S.SWAPPING,
     },
-    _S.RESUMING: {**_TAKING_PART, _T.VEHICLE_READY: _S.FLYING, _T.CLAIM_LOST: _S.WAITING},
-    _S.WAITING: {**_TAKING_PART, _T.VEHICLE_READY: _S.IDLE},
+    _S.RESUMING: {
+        **_TAKING_PART,
+        _T.VEHICLE_READY: _S.FLYING,
+        _T.CLAIM_LOST: _S.WAITING,
+        _T.STANDS_AT_BASE: _S.SWAPPING,
+    },
+    _S.WAITING: {
+        **_TAKING_PART,
+        _T.VEHICLE_READY: _S.IDLE,
+        _T.STANDS_AT_BASE: _S.SWAPPING,
+    },
     _S.IDLE: {**_TAKING_PART, _T.DECIDED: _S.FLYING, _T.BASE_CHOSEN: _S.FLYING_TO_BASE},
     _S.FLYING: {
         **_TAKING_PART,

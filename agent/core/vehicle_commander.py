@@ -104,6 +104,8 @@ class VehicleCommander(AgentPart):
             case Telemetry():
                 self._mission_view.move(report)
                 self._tasking.measure(now_s)
+            case Refused(Prepare(), reason, stands=True) if self._stand_there(reason, now_s):
+                pass
             case Refused(order, reason):
                 self._give_up_order(order, reason, now_s)
             case HandedOver(reason, silent):
@@ -133,6 +135,16 @@ class VehicleCommander(AgentPart):
             self._mission_view.take_off()
             self._tasking.begin(now_s)
             self._log("airborne")
+
+    def _stand_there(self, reason: str, now_s: float) -> bool:
+        """Whether a vehicle that an earlier life had in the air stands at a base now.
+
+        It had not taken off there yet, or has come down there meanwhile.
+        """
+        stands = self._left_in_air and self._tasking.stand_where_it_is(now_s)
+        if stands:
+            self._log("found on the ground at a base", reason=reason)
+        return stands
 
     def _give_up_order(self, order: VehicleOrder, reason: str, now_s: float) -> None:
         label = self._tasking.label(order.leg) if isinstance(order, GoTo) else {}

@@ -258,7 +258,8 @@ class _Preparation:
         if self._flew:
             return self._fail("the vehicle disarmed after takeoff")
         if self._order.left_in_air and not self._arm.command.given:
-            return self._fail(_CAME_DOWN)
+            known = vehicle.position is not None  # it may stand where it is to be found
+            return self._fail(_CAME_DOWN) if known else self._wait(_NO_PLACE)
         if unready := self._firmware.unready(vehicle):
             return self._wait(self._with_warning(unready))
         if objection := self._arming_objection():

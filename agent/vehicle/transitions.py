@@ -155,7 +155,8 @@ def _after_preparation(preparing: Preparing, session: VehicleSession) -> Activit
             return go_to(Hovering(session), preparing.next_order, session)
         session.report(VehicleReady())
         return Hovering(session)
-    flies = session.vehicle.armed and firmware is not None and firmware.airborne(session.vehicle)
+    aloft = firmware is not None and firmware.airborne(session.vehicle)
+    flies = session.vehicle.armed and aloft
     if flies and heartbeat is not None and preparing.obeys(heartbeat.custom_mode):
         session.report(ReturnAdvised(failure))  # nobody else would bring it down
         return Hovering(session)
@@ -164,7 +165,8 @@ def _after_preparation(preparing: Preparing, session: VehicleSession) -> Activit
     if isinstance(preparing, Departing):
         session.report(Refused(preparing.next_order, failure))
         return preparing.standing.again(disturbed=preparing.disturbed)
-    session.report(Refused(preparing.order, failure))
+    stands = not (aloft or session.vehicle.armed)
+    session.report(Refused(preparing.order, failure, stands))
     return Idle(session)
 
 

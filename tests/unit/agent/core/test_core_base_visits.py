@@ -450,7 +450,9 @@ def test_started_again_beside_the_slots_it_still_waits_for_one(script: Script) -
     life.run_until(BUDGET_S + 10.0)
 
     assert (life.state(), life.stage) == (AgentState.BESIDE_SLOTS, BaseStage.PARKED)
-    assert orders(life.log) == []
+    assert life.way_home.land, "it may have been on its way down"
+    assert life.way_home.resume
+    assert life.way_home.via_enu_m == ABOVE_BASE
     assert life.claim is not None
     assert life.claim.arrives_s == 50.0
     life.hear("u1", visiting(BaseStage.PARKED, 5.0), BUDGET_S + 11.0)
@@ -681,6 +683,69 @@ def test_started_again_before_it_departs_it_decides_anew_from_the_ground(script:
 
     assert life.state() is AgentState.DEPARTING
     assert life.task == "t0"
+
+
+def killed_on_departure(script: Script, *others: str) -> FieldAgent:
+    """Its next life, which has been told that it departed, and looks for its vehicle."""
+    agent = swapping(script, *others)
+    script.items = ["t0"]
+    agent.get_full(70.0)
+    assert (agent.state(), agent.task) == (AgentState.FLYING, "t0")
+    life = agent.next_life()
+    for other in others:
+        life.see(other)
+    assert isinstance(life.last_order, Prepare)
+    assert life.last_order.left_in_air
+    return life
+
+
+def test_killed_before_it_took_off_it_is_found_at_the_base_and_gets_ready_anew(
+    script: Script,
+) -> None:
+    life = killed_on_departure(script)
+    life.be_at((58.0, 3.0, 0.2), 1.0)
+
+    life.happen(Refused(life.last_order, "it stands on the ground", stands=True), 74.0)
+
+    assert life.state() is AgentState.BESIDE_SLOTS, "others may have come to the slot"
+    assert (life.task, life.stage) == (None, BaseStage.PARKED)
+    life.run_until(74.0 + life.timing.objection_window_s)
+    assert life.state() is AgentState.SWAPPING
+    assert life.landing.position_enu_m == (50.0, 0.0, 0.0)
+    script.items = ["t0"]
+    life.get_full(100.0)
+    assert (life.state(), life.task) == (AgentState.FLYING, "t0")
+    assert life.claim is not None
+    assert life.claim.sortie_end_s == 100.0 + BUDGET_S
+
+
+def test_found_at_a_base_whose_slot_another_has_taken_it_waits_for_it(script: Script) -> None:
+    life = killed_on_departure(script, "u1")
+    life.hear("u1", visiting(BaseStage.LANDED, 72.0))
+    life.be_at((50.0, 0.0, 0.0), 1.0)
+
+    life.happen(Refused(life.last_order, "it stands on the ground", stands=True), 74.0)
+    life.run_until(90.0)
+    assert life.state() is AgentState.BESIDE_SLOTS
+
+    life.hear("u1", visiting(BaseStage.PARKED, 72.0), 91.0)
+    assert life.state() is AgentState.SWAPPING
+
+
+@pytest.mark.parametrize(
+    ("place_enu_m", "stands"), [((76.0, 0.0, 0.0), True), ((50.0, 0.0, 0.0), False)]
+)
+def test_found_elsewhere_or_in_the_air_it_is_left_alone(
+    script: Script, place_enu_m: Point, stands: bool
+) -> None:
+    life = killed_on_departure(script)
+    life.be_at(place_enu_m, 1.0)
+
+    life.happen(Refused(life.last_order, "it stands on the ground", stands=stands), 74.0)
+
+    assert isinstance(life.last_order, Return)
+    assert life.claim is not None
+    assert life.claim.phase is ClaimPhase.OUT
 
 
 def test_its_status_tells_of_the_visit(script: Script) -> None:
