@@ -120,7 +120,10 @@ class Landing(Activity):
         if heartbeat is None or firmware is None or session.silent:
             return
         if not self._begun:
-            self._begin(heartbeat, firmware)
+            self._begin(firmware)
+        if not self._begun:
+            session.tell_not_ready("waiting for a position")
+            return
         if self._approach is not None and self._approaches(self._approach, heartbeat):
             return
         if self.failure is None:
@@ -151,22 +154,22 @@ class Landing(Activity):
         self._ours = True
         return True
 
-    def _begin(self, heartbeat: Heartbeat, firmware: Firmware) -> None:
+    def _begin(self, firmware: Firmware) -> None:
         """Fly above the place, unless it is there."""
-        session, self._begun = self._session, True
+        session = self._session
         if session.vehicle.landed is LandedState.ON_GROUND:
+            self._begun = True
             return
         place_enu_m = session.known_place_m()
         if place_enu_m is None:
-            self.failure = "where it is is not known"
-            return
-        above_enu_m = (*self.order.position_enu_m[:2], place_enu_m[2])
+            return  # told in a moment, or it is handed over for that
+        self._begun = True
+        above_enu_m = session.config.within_fence((*self.order.position_enu_m[:2], place_enu_m[2]))
         if math.dist(place_enu_m, above_enu_m) <= _ABOVE_M:
             return
         self.failure = session.way_objection((above_enu_m,))
         if self.failure is None:
             self._approach = ReturnVia(session, firmware, (above_enu_m,), place_enu_m)
-        del heartbeat
 
     def _approaches(self, approach: ReturnVia, heartbeat: Heartbeat) -> bool:
         """Whether it is still on its way above the place."""

@@ -50,7 +50,14 @@ _IN_THE_AIR = {
 _LET_GO = {FlightPhase.IDLE, FlightPhase.HANDED_OVER}
 
 SUCCESSORS: Final[dict[FlightPhase, frozenset[FlightPhase]]] = {
-    FlightPhase.IDLE: frozenset({*_IN_THE_AIR, FlightPhase.STANDING, FlightPhase.HANDED_OVER}),
+    FlightPhase.IDLE: frozenset(
+        {
+            *_IN_THE_AIR,
+            FlightPhase.STANDING,
+            FlightPhase.HOVERING,  # found in the air, and a zone lies before its base
+            FlightPhase.HANDED_OVER,
+        }
+    ),
     FlightPhase.PREPARING: frozenset(
         {
             FlightPhase.HOVERING,

@@ -190,6 +190,8 @@ class BridgeWatch:
         """To be kept out of, and how far."""
         self._base_m: Point | None = None
         """Where it was last ordered to land for another battery."""
+        self._swap_leg: int | None = None
+        """Number of that order."""
         self._stood = self._may_start = False
         """Whether it landed there and has not flown since, and may start again."""
 
@@ -204,7 +206,7 @@ class BridgeWatch:
         elif isinstance(event, KeepOut):
             self._zones = [(zone, event.margin_m) for zone in event.zones]
         elif isinstance(event, Ready):
-            let = before is FlightPhase.STANDING and event.leg == self._task.leg
+            let = before is FlightPhase.STANDING and event.leg == self._swap_leg
             self._may_start |= let
         self._gave_mission &= not isinstance(event, Return)
         actions = self.bridge.step(event, now_s)
@@ -241,7 +243,7 @@ class BridgeWatch:
             case Return(via_enu_m=tuple() as via_enu_m):
                 self._task = _Task((*places_m[-_PLACES:], via_enu_m))
             case Swap(leg, position_enu_m):
-                self._base_m = position_enu_m
+                self._base_m, self._swap_leg = position_enu_m, leg
                 self._task = _Task(places_m, leg, position_enu_m)
             case Hold() if self.bridge.phase is FlightPhase.STANDING:
                 pass  # it stands already, and is looked after as before
@@ -430,7 +432,7 @@ class BridgeWatch:
                 hold(leg == self._task.leg, f"landed by order {leg}, not {self._task.leg}")
                 self._stood = True
             case Swapped(leg):
-                hold(leg == self._task.leg, f"swapped by order {leg}, not {self._task.leg}")
+                hold(leg == self._swap_leg, f"swapped by order {leg}, not {self._swap_leg}")
                 hold(self._may_start, "ready, though nobody let it start")
             case VehicleReady():
                 hold(self._prepared, "ready, though nobody asked")

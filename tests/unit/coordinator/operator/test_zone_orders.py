@@ -15,8 +15,8 @@ from swarm.protocol.encoding import SMALL_LIMIT_BYTES, encode
 from swarm.protocol.events import PeerGone, Tick
 from swarm.protocol.field_messages import BaseSpec, UavReady, ZoneEdit, ZoneSpec
 from swarm.protocol.messages import MissionPhase
-from swarm.protocol.operator_commands import zones_in_force
-from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
+from swarm.protocol.operator_commands import NOT_READY, zones_in_force
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, Status, StatusPhase
 from tests.support.builders import brief, epoch, held, message, uav
 from tests.support.order_desk import FLEET, PATIENCE_S, TIMING, Desk, came
 
@@ -179,14 +179,62 @@ def at_a_base() -> Desk:
     return desk
 
 
-def test_a_uav_at_a_base_may_start_once_it_has_confirmed_so() -> None:
+def standing(note: str) -> Status:
+    return Status(StatusPhase.SERVING, None, (0.0, 0.0, 0.0), None, 0.9, 30.0, {}, note)
+
+
+def test_a_uav_at_a_base_may_start_once_it_has_confirmed_so_and_its_battery_is_full() -> None:
     desk = at_a_base()
     tracked = desk.give(ReadyRequest("u0", "battery 7"))
     assert [said.body for said in desk.said] == [UavReady("u0", 1, "battery 7")]
     desk.confirm(tracked, "u1")
     assert tracked.verdict is None
     desk.confirm(tracked, "u0")
+    assert tracked.verdict is None
+    desk.hear("u0", replace(SWAPPING, phase=ClaimPhase.IDLE))
     assert came(tracked) == (RequestResult.OBEYED, "u0 may start again from b0")
+
+
+def test_a_uav_whose_battery_is_not_full_refuses_with_the_reason() -> None:
+    desk = at_a_base()
+    why = "battery at 30%, below the 90% of a full one"
+    desk.hear("u0", standing(f"{NOT_READY}an older reason"))
+    tracked = desk.give(ReadyRequest("u0"))
+    desk.confirm(tracked, "u0")
+    assert tracked.verdict is None, "what it says of its vehicle may be older than the word"
+    desk.hear("u0", standing(f"{NOT_READY}{why}"))
+    assert came(tracked) == (RequestResult.NOT_OBEYED, f"u0 stays on the ground: {why}")
+
+
+def test_what_a_uav_that_may_start_still_waits_for_is_told_in_the_end() -> None:
+    desk = at_a_base()
+    tracked = desk.give(ReadyRequest("u0"))
+    desk.confirm(tracked, "u0")
+    for _ in range(2):
+        desk.hear("u0", standing("waiting to hear its charge"))
+    assert tracked.verdict is None
+    desk.wait(PATIENCE_S)
+    text = "u0 may start again from b0, not yet: waiting to hear its charge"
+    assert came(tracked) == (RequestResult.OBEYED, text)
+
+
+@pytest.mark.parametrize(
+    ("claim", "why"),
+    [
+        (
+            replace(SWAPPING, stage=BaseStage.PARKED, sortie_end_s=20.0),
+            "u0 waits for a slot of b0: say so once its battery is changed there",
+        ),
+        (replace(SWAPPING, sortie_end_s=50.0), "u0 has not touched down at b0 yet"),
+    ],
+    ids=["beside the slots", "coming down"],
+)
+def test_who_has_no_new_battery_yet_cannot_be_let_start(claim: Claim, why: str) -> None:
+    desk = at_a_base()
+    desk.hear("u0", claim)
+
+    assert came(desk.give(ReadyRequest("u0"))) == (RequestResult.NOT_OBEYED, why)
+    assert desk.said == []
 
 
 def test_a_uav_that_has_gone_on_was_ready() -> None:
