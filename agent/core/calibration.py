@@ -194,12 +194,26 @@ class FlightMeter(AgentPart):
 
     def depart(self, leg: int, predicted_s: float | None = None) -> None:
         """It sets off now, and should take so long by the brief; None: nobody can tell."""
+        self._note_late_climb()
         at_rest, self._at_rest, self._departure, self._leg = self._at_rest, False, None, leg
         stands, self._stands = self._stands, False
         if predicted_s is None:
             return
         if stands or (at_rest and predicted_s >= _SHORTEST_S):
             self._departure = _Departure(predicted_s, self._mission_view.now_s, stands)
+
+    def _note_late_climb(self) -> None:
+        """Who turns away from its first leg later than it was to arrive has climbed for longer.
+
+        For longer than can be told: else it might set off for the same again and again.
+        """
+        departure, now_s = self._departure, self._mission_view.now_s
+        if departure is None or not (departure.climbs and self._counts) or self._verticals is None:
+            return
+        flown_s = departure.predicted_s * self.rates.time_frac
+        climb_s = now_s - departure.at_s - flown_s
+        if climb_s >= self.rates.climb_s:
+            self._vote(self._medians.climbs, climb_s + STEP_S, _VERTICAL_RANGE, now_s)
 
     def arrive(self, leg: int, now_s: float) -> bool:
         """It is where that leg ends; whether the battery is to be looked at anew."""

@@ -431,6 +431,7 @@ class BridgeWatch:
             case Landed(leg):
                 hold(leg == self._task.leg, f"landed by order {leg}, not {self._task.leg}")
                 self._stood = True
+                self._may_start |= self.bridge.config.ready_by_itself
             case Swapped(leg):
                 hold(leg == self._swap_leg, f"swapped by order {leg}, not {self._swap_leg}")
                 hold(self._may_start, "ready, though nobody let it start")

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from agent.core.agent_core import AgentCore
 from agent.core.interface import (
     Arrived,
     HandedOver,
@@ -207,6 +208,7 @@ class BridgedFleet:
         network: joins the agents; an ideal one if None.
         watch: is told all that happens on the bus.
         timing: of agents and coordinator.
+        agent: makes the core of an agent.
     """
 
     def __init__(
@@ -223,6 +225,7 @@ class BridgedFleet:
         network: Callable[[EventQueue], Network] | None = None,
         watch: WorldListener | None = None,
         timing: Timing | None = None,
+        agent: Callable[..., AgentCore] = AgentCore,
     ) -> None:
         self.flavour, self.style = flavour, style
         self.vehicles: dict[str, BridgedVehicle] = {}
@@ -245,6 +248,7 @@ class BridgedFleet:
                 network or (lambda queue: IdealNetwork(queue, 0.02)),
                 kept=list(self.books),
                 vehicle=self._vehicle,
+                agent=agent,
             ),
             watch=watch,
         )
