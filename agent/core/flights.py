@@ -23,7 +23,6 @@ from swarm.protocol.fields import Point
 from swarm.protocol.messages import TaskEntry
 from swarm.protocol.operator_commands import zones_in_force
 
-
 _AT_BASE_M = 25.0
 """Who is no farther from a base, or from its own spot there, is at it: agent.vehicle.standing."""
 

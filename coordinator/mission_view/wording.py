@@ -6,9 +6,11 @@ One way to say each thing, for the story, the terminal, the dashboard and explan
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Final
 
 from swarm.model import TaskId
 from swarm.model.ids import FLEET
+from swarm.model.plan import LeftOut
 from swarm.protocol.board import claim_strength
 from swarm.protocol.calibration import FlightRates
 from swarm.protocol.field_messages import ZoneEdit
@@ -107,6 +109,15 @@ def zone_said(edit: ZoneEdit) -> str:
     """What holds of a zone since the operator's word, and why."""
     how = "taken away" if edit.withdrawn else "drawn"
     return f"zone {edit.zone.id} {how} by the operator{because(edit.reason)}"
+
+
+LEFT_OUT_WORDS: Final = {
+    LeftOut.NOBODY_CAN: "nobody can, not even as the only task",
+    LeftOut.DUE: "not worth it, or nobody gets done by the due time",
+    LeftOut.WINDOW: "nobody gets there before it closes",
+    LeftOut.ENERGY: "nobody has the energy for it beside the rest",
+}
+"""Why a plan leaves a task out."""
 
 
 def left_out_in_words(left_out: Mapping[TaskId, str], at_most: int | None = None) -> str:

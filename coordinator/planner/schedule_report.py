@@ -10,6 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from rich.text import Text
 
+from coordinator.mission_view.wording import LEFT_OUT_WORDS
 from swarm.model import Mission, Plan, TaskId, Uav
 from swarm.model.plan import START, LeftOut, ScheduleEntry
 from swarm.runtime.table import NONE, Column
@@ -103,7 +104,7 @@ def flown(mission: Mission, plan: Plan, uav: Uav) -> Text:
 def reasons(mission: Mission, left_out: Mapping[TaskId, LeftOut]) -> Iterator[tuple[str, Text]]:
     """Rows that say in words what is left out and why; red if it was required."""
     required = {task.id for task in mission.tasks if task.due_s is None}
-    for reason, words in _WORDS.items():
+    for reason, words in LEFT_OUT_WORDS.items():
         tasks = [task for task, why in left_out.items() if why is reason]
         if not tasks:
             continue
@@ -111,11 +112,3 @@ def reasons(mission: Mission, left_out: Mapping[TaskId, LeftOut]) -> Iterator[tu
         more = f" and {len(tasks) - _MOST_NAMED} more" if len(tasks) > _MOST_NAMED else ""
         style = _LATE if required & set(tasks) else ""
         yield "left out", Text(f"{named}{more}: {words}", style=style)
-
-
-_WORDS = {
-    LeftOut.NOBODY_CAN: "nobody can, not even as the only task",
-    LeftOut.DUE: "not worth it, or nobody gets done by the due time",
-    LeftOut.WINDOW: "nobody gets there before it closes",
-    LeftOut.ENERGY: "nobody has the energy for it beside the rest",
-}

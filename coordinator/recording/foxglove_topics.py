@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.presentation import uav_colour
-from coordinator.mission_view.scene import TAKEN, Scene, TaskView, scene_of
+from coordinator.mission_view.scene import TAKEN, Scene, scene_of
 from coordinator.mission_view.uav_state import LOST, UavView
 from coordinator.recording.foxglove_schemas import (
     LOCATION_FIX,
@@ -37,7 +37,7 @@ from coordinator.recording.foxglove_schemas import (
     text,
 )
 from coordinator.recording.records import FileMessage
-from swarm.model import Origin
+from swarm.model import Base, Origin, Zone
 from swarm.model.frames import wgs84_from_enu
 from swarm.protocol.board import TaskState
 
@@ -54,6 +54,8 @@ _STILL_M_S: Final = 0.1
 _OF_MISSION: Final = 1.0 / 60.0
 """Size of a task, as a part of the mission's extent."""
 _GREY: Final = (0.6, 0.6, 0.6, 0.5)
+_ZONE: Final = (0.84, 0.37, 0.0, 0.9)
+_BASE: Final = (0.8, 0.47, 0.65, 0.9)
 _WHITE: Final = (1.0, 1.0, 1.0, 1.0)
 # Okabe and Ito's colours; states differ in shape and opacity, too.
 _STATE_COLOURS: Final = {
@@ -92,6 +94,8 @@ class _Progress:
     """UAVs that disappeared while they took part."""
     dropped: int
     """Messages that all agents together have dropped."""
+    left_out: int = 0
+    """Open tasks that the plan leaves out."""
 
 
 _ADAPTER: Final = TypeAdapter(_Progress)
@@ -113,6 +117,10 @@ class FoxgloveTopics:
         self._places: dict[str, Point] = {}
         self._tasks: tuple[object, ...] = ()
         self._lists: tuple[object, ...] = ()
+        self._zones: tuple[Zone, ...] = ()
+        self._drawn: set[str] = set()
+        """Zones that were shown: of one that was taken away nothing is to stay."""
+        self._bases: tuple[tuple[Base, str], ...] = ()
         self._told = 0
         """Lines of the story that have been told."""
 
@@ -128,10 +136,14 @@ class FoxgloveTopics:
         yield from self._fixes(scene, Origin(*mission_state.replica.brief.origin), time_ns)
         size_m = _size_m(scene)
         yield _scene("uavs", [_uav(view, size_m, time_ns) for view in scene.uavs])
-        tasks = tuple((task.id, task.position_enu_m, task.stands) for task in scene.tasks)
+        yield from self._field(scene, size_m, time_ns)
+        tasks = tuple(
+            (task.id, task.position_enu_m, task.stands, scene.left_out.get(task.id))
+            for task in scene.tasks
+        )
         if tasks != self._tasks:
             self._tasks = tasks
-            yield _scene("tasks", _task_entities(scene.tasks, size_m, time_ns))
+            yield _scene("tasks", _task_entities(scene, size_m, time_ns))
         lists = _lists(scene)
         if lists != self._lists:
             self._lists = lists
@@ -140,6 +152,20 @@ class FoxgloveTopics:
                 for uav, points, colour in lists
             ]
             yield _scene("lists", entities)
+
+    def _field(self, scene: Scene, size_m: float, time_ns: int) -> Iterator[FileMessage]:
+        """Zones in force, and bases with who is there; nothing of a mission without them."""
+        zones = scene.mission.zones
+        if zones != self._zones:
+            self._zones = zones
+            names = {zone.id for zone in zones}
+            gone = [entity(f"zone {name}", FRAME, time_ns, {}) for name in self._drawn - names]
+            self._drawn |= names
+            yield _scene("zones", [*gone, *(_zone(zone, time_ns) for zone in zones)])
+        bases = tuple((base, _visitors(scene, base)) for base in scene.mission.bases)
+        if bases != self._bases:
+            self._bases = bases
+            yield _scene("bases", [_base(base, who, size_m, time_ns) for base, who in bases])
 
     def _story(self, mission_state: MissionState, time_ns: int) -> Iterator[FileMessage]:
         for happening in mission_state.told_since(self._told):
@@ -190,6 +216,7 @@ def _progress(mission_state: MissionState, scene: Scene, now_s: float) -> FileMe
         uavs=len(scene.uavs),
         lost=len(mission_state.lost),
         dropped=scene.dropped,
+        left_out=len(scene.left_out),
     )
     return FileMessage("/progress", PROGRESS, _ADAPTER.dump_json(progress))
 
@@ -204,6 +231,12 @@ def _uav(view: UavView, size_m: float, time_ns: int) -> Json:
     facts = {"does": str(view.does), "task": view.task or "", "note": view.note}
     if view.battery_frac is not None:
         facts["battery"] = f"{view.battery_frac:.0%}"
+    if view.base is not None:
+        facts |= {"base": view.base, "visit": view.visit or ""}
+    if view.sortie_left_s is not None:
+        facts["sortie left"] = f"{view.sortie_left_s:.0f} s"
+    if view.swaps:
+        facts["swaps"] = str(view.swaps)
     label = f"{view.id} {view.does.upper()}" if view.does == LOST else view.id
     # Sphere and arrow: where it is, and where to, as far as that is known.
     shapes: dict[str, list[Json]] = {
@@ -217,9 +250,48 @@ def _uav(view: UavView, size_m: float, time_ns: int) -> Json:
     return entity(view.id, FRAME, time_ns, facts, **shapes)
 
 
-def _task_entities(tasks: tuple[TaskView, ...], size_m: float, time_ns: int) -> list[Json]:
-    """One entity for each state: what nobody has touched is a ball, what is over a box."""
-    entities = []
+def _zone(zone: Zone, time_ns: int) -> Json:
+    """Its borders, on its floor and below its ceiling where it has them."""
+    heights_m = {zone.floor_m or 0.0} | ({zone.ceiling_m} if zone.ceiling_m is not None else set())
+    lines = [
+        line_strip([(east_m, north_m, up_m) for east_m, north_m in (*ring, ring[0])], _ZONE, 3.0)
+        for ring in (zone.polygon_enu_m, *zone.holes_enu_m)
+        for up_m in sorted(heights_m)
+    ]
+    bounds = {"floor": zone.floor_m, "ceiling": zone.ceiling_m}
+    facts = {name: f"{up_m:g} m" for name, up_m in bounds.items() if up_m is not None}
+    if zone.inclusive:
+        facts["inclusive"] = "nobody may leave it"
+    east_m, north_m = zone.polygon_enu_m[0]
+    label = text((east_m, north_m, zone.floor_m or 0.0), zone.id, _WHITE)
+    return entity(f"zone {zone.id}", FRAME, time_ns, facts, lines=lines, texts=[label])
+
+
+def _visitors(scene: Scene, base: Base) -> str:
+    """Who is there or on the way, and what about."""
+    return ", ".join(
+        f"{uav.id} {uav.visit}" for uav in scene.uavs if uav.base == base.id and uav.visit
+    )
+
+
+def _base(base: Base, who: str, size_m: float, time_ns: int) -> Json:
+    facts = {"swap": f"{base.swap_s:g} s", "uavs": who}
+    if base.slots is not None:
+        facts["slots"] = str(base.slots)
+    solid = cube(base.position_enu_m, size_m, _BASE)
+    label = text(_raised(base.position_enu_m, size_m), base.id, _WHITE)
+    return entity(f"base {base.id}", FRAME, time_ns, facts, cubes=[solid], texts=[label])
+
+
+def _task_entities(scene: Scene, size_m: float, time_ns: int) -> list[Json]:
+    """One entity for each state: what nobody has touched is a ball, what is over a box.
+
+    Another tells which open ones the plan leaves out, and why.
+    """
+    tasks, entities = scene.tasks, []
+    why = {str(task): reason for task, reason in scene.left_out.items()}
+    if scene.mission.zones or scene.mission.bases or why:
+        entities.append(entity("left out", FRAME, time_ns, why))
     for state, colour in _STATE_COLOURS.items():
         mine = [task.position_enu_m for task in tasks if task.stands == state]
         shape, kind = (
@@ -234,16 +306,16 @@ def _task_entities(tasks: tuple[TaskView, ...], size_m: float, time_ns: int) -> 
 
 
 def _lists(scene: Scene) -> tuple[tuple[str, tuple[Point, ...], Colour], ...]:
-    """What each UAV's list still holds: places in order."""
+    """What each UAV's list still holds: places in order; in the field, the way that it flies."""
     places = {task.id: task.position_enu_m for task in scene.tasks}
-    return tuple(
-        (
-            str(view.id),
-            tuple(places[task] for task in view.planned if task in places),
-            _uav_colour(view.number),
-        )
-        for view in scene.uavs
-    )
+    ahead: list[tuple[str, tuple[Point, ...], Colour]] = []
+    for view in scene.uavs:
+        points = tuple(places[task] for task in view.planned if task in places)
+        if view.ways is not None:
+            flat_m = (*view.ways.leg[1:], *view.ways.ahead[1:])
+            points = tuple((east_m, north_m, view.start_enu_m[2]) for east_m, north_m in flat_m)
+        ahead.append((str(view.id), points, _uav_colour(view.number)))
+    return tuple(ahead)
 
 
 def _size_m(scene: Scene) -> float:

@@ -35,6 +35,8 @@ class ByHand:
         keys: folder of the mission's authority; None to fly without keys.
         programs: words that start `swarm` for the process of that name, where they are others
             than for everybody.
+        flavour: of the simulated autopilots.
+        by_itself: whether their vehicles start again without anybody's word.
     """
 
     def __init__(
@@ -45,6 +47,9 @@ class ByHand:
         speedup: float = 2.0,
         keys: Path | None = None,
         programs: Mapping[str, Sequence[str]] | None = None,
+        *,
+        flavour: str = "ardupilot",
+        by_itself: bool = False,
     ) -> None:
         self.folder = folder
         self.mission = mission
@@ -64,10 +69,13 @@ class ByHand:
         self._line(router)
         chosen = [word for uav in self.uavs for word in ("--uav", uav)]
         listen = ["--listen", "tcp:127.0.0.1:0", *flown, "--json"]
-        autopilot = ["autopilot", str(self._scenario), *chosen, *listen]
+        autopilot = ["autopilot", str(self._scenario), *chosen, *listen, "--flavour", flavour]
+        self._by_itself = by_itself
         flying = self.start("autopilot", autopilot)
-        vehicles = [self._line(flying) for _ in self.uavs]
-        self.agents = [self._agent(vehicle) for vehicle in vehicles]
+        self._vehicles = {
+            str(said["uav"]): said for said in map(self._line, [flying] * len(self.uavs))
+        }
+        self.agents = [self._agent(uav) for uav in self.uavs]
 
     def coordinator(self, name: str, *options: str) -> subprocess.Popen[str]:
         """Start a coordinator; ``name`` is that of its log."""
@@ -127,11 +135,16 @@ class ByHand:
             task.id for task in self.mission.tasks if task.id != KEEPER
         )
 
-    def _agent(self, vehicle: dict[str, object]) -> subprocess.Popen[str]:
-        uav = str(vehicle["uav"])
+    def restart(self, uav: str, name: str) -> None:
+        """Start the agent of a UAV again, as it was started; ``name`` is that of its log."""
+        self.agents[self.uavs.index(uav)] = self._agent(uav, name)
+
+    def _agent(self, uav: str, name: str = "") -> subprocess.Popen[str]:
+        vehicle = self._vehicles[uav]
         words = ["agent", "--mission", self.mission.name, "--uav", uav]
         words += ["--mavlink", str(vehicle["url"]), "--system-id", str(vehicle["system_id"])]
-        return self.start(uav, [*words, *self.seat, *self.keys_of(uav)])
+        words += ["--ready-by-itself"] if self._by_itself else []
+        return self.start(name or uav, [*words, *self.seat, *self.keys_of(uav)])
 
     @staticmethod
     def _line(process: subprocess.Popen[str]) -> dict[str, object]:

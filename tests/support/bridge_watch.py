@@ -7,7 +7,8 @@
    mode of ours, motors, a takeoff and targets.
 4. A target lies within the fence and is one that was ordered, or, while the vehicle is
    being stopped, where it said it was since the order, or the nearest place within the
-   fence; and that is in reach of another place that it told. What names no place is a
+   fence; and that is in reach of another place that it told. One that an earlier life may
+   have left climbing may be sent above where it said it was. What names no place is a
    pause, only told to stop a vehicle.
 5. After a hand-over it says nothing but heartbeats and requests for messages, until it is
    given a new order.
@@ -86,6 +87,7 @@ _MOST_BUFFERED_BYTES = 280
 _PLACES = 50
 _ASIDE_M = 1.0
 """So much nearer than the margin of a zone a way may come."""
+_CLIMB_ASIDE_M = 0.5
 _FASTEST_M_S = 50.0
 _RECENT = 20
 _LEAP_M = 25.0
@@ -147,6 +149,8 @@ class _Task:
     if the vehicle does not take a newer one, and may be taken up again after a hand-over."""
     leg: int | None = None
     """Under way."""
+    climbs: bool = False
+    """An earlier life had it in the air: it may climb from where it is."""
     base_m: Point | None = None
     """Where to land for another battery."""
     told_m: list[tuple[Point, float]] = field(default_factory=list)
@@ -235,16 +239,16 @@ class BridgeWatch:
                 first_m = (*corners_m, order.position_enu_m)[0]
                 places_m += ((*self._base_m[:2], first_m[2]),)
         match order:
-            case Prepare(position_enu_m):
+            case Prepare(position_enu_m, left_in_air=climbs):
                 self._prepared = True
-                self._task = _Task((*places_m[-_PLACES:], position_enu_m))
+                self._task = _Task((*places_m[-_PLACES:], position_enu_m), climbs=climbs)
             case GoTo(leg, position_enu_m):
                 self._task = _Task((*places_m[-_PLACES:], position_enu_m), leg)
             case Return(via_enu_m=tuple() as via_enu_m):
                 self._task = _Task((*places_m[-_PLACES:], via_enu_m))
             case Swap(leg, position_enu_m):
                 self._base_m, self._swap_leg = position_enu_m, leg
-                self._task = _Task(places_m, leg, position_enu_m)
+                self._task = _Task(places_m, leg, base_m=position_enu_m)
             case Hold() if self.bridge.phase is FlightPhase.STANDING:
                 pass  # it stands already, and is looked after as before
             case Hold() | Return():
@@ -369,6 +373,11 @@ class BridgeWatch:
         ordered = any(_near(place_m, place) for place in places_m)
         if FlightPhase.LANDING in phases and base_m is not None:
             ordered |= math.dist(place_m[:2], base_m[:2]) <= _TOLERANCE_M
+        if self._task.climbs:
+            here_m = [told_m for told_m, _ in self._task.told_m]
+            ordered |= any(
+                math.dist(place_m[:2], told_m[:2]) <= _CLIMB_ASIDE_M for told_m in here_m
+            )
         self._see_zones(place_m)
         hold(ordered, f"sent to {place_m}, not to {places_m[-3:]}")
 

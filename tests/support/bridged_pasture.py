@@ -32,8 +32,8 @@ BARN = Base(BaseId("barn"), (40.0, -40.0, 0.0), swap_s=15.0, slots=1)
 PLACES = ((60, 120), (160, 160), (220, 60), (200, -110), (110, -150), (40, -130))
 UAVS = ("u0", "u1")
 _LOOK_S = 0.5
-_LANDING_LATE_S = 4.0
-"""By so much a first landing may take longer than anybody knew."""
+_LATE_S = 8.0
+"""By so much a last leg and a first landing may take longer than anybody knew."""
 _LIFTED_M = 0.5
 """Who is higher above the ground is in the air."""
 
@@ -116,7 +116,7 @@ class PastureFleet(BridgedFleet):
         self.unsafe: list[str] = []
         """What should not have been."""
         endurance_s = min(uav.endurance_s or math.inf for uav in flown.uavs)
-        self._tolerance_frac = _LANDING_LATE_S / endurance_s
+        self._tolerance_frac = _LATE_S / endurance_s
         self.lowest_frac = 1.0
         """Charge with which anybody was in the air."""
         self._by_itself = by_itself

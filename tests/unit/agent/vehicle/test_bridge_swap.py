@@ -177,8 +177,10 @@ def test_one_that_never_told_its_charge_starts_by_the_word_alone(fake: type[Fake
         ((40.0, 0.0, 0.0), "it stands 40 m from its base: carry it there"),
         (
             (0.0, 0.0, 15.0),
-            "its height is +15 m off that of its base: restart it, "
-            "or correct [origin] alt_m, or position_m of the base",
+            (
+                "its height is +15 m off that of its base: restart it, "
+                "or correct [origin] alt_m, or position_m of the base"
+            ),
         ),
     ],
     ids=["aside", "above"],

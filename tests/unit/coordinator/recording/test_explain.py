@@ -13,7 +13,9 @@ from coordinator.recording.growing_mcap import Patch
 from coordinator.recording.reader import Recording, read_recording
 from coordinator.recording.recorder import Recorder, RecordingInfo
 from coordinator.recording.records import RecordingStarted
+from swarm.model import Plan, TaskId
 from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.model.plan import LeftOut
 from swarm.protocol.events import CommonEvent, MessageReceived, PeerGone, PeerSeen, Tick
 from swarm.protocol.messages import Body, CommandKind, MissionPhase, OperatorCommand, TaskEdit
 from swarm.protocol.timing import Timing
@@ -56,6 +58,9 @@ class Tape:
         self.say("u0", IDLE, -0.5)
         self.say("u1", IDLE, -0.5)
         self.say(COORDINATOR, epoch("u0", "u1"), 0.0)
+
+    def note(self, plan: Plan, mission_s: float) -> None:
+        self._recorder.note(plan, BEGIN_S + mission_s, round((BEGIN_S + mission_s) * 1e9))
 
     def happen(self, fact: CommonEvent, mission_s: float) -> None:
         now_s = BEGIN_S + mission_s
@@ -116,6 +121,19 @@ def test_a_task_that_was_chosen_claimed_and_done(tape: Tape) -> None:
     assert told.worth == pytest.approx(1000.0 - 10.25)
     assert told.ending == (
         "So t0 was done by u0 at 10.2 s. That is worth 989.75 value·s, 100.0 % of J = 989.75."
+    )
+
+
+def test_a_task_that_the_plan_leaves_out_tells_why(tape: Tape) -> None:
+    left = {TaskId("t1"): LeftOut.ENERGY}
+    plan = Plan("test", "greedy", {}, 0.0, {}, None, None, 1, 0.0, 0, schedule={}, left_out=left)
+    tape.note(plan, 0.0)
+
+    explained = explain_task(tape.stop(), "t1")
+
+    assert explained.ending == (
+        "The plan leaves t1 out: nobody has the energy for it beside the rest. "
+        "So t1 is still open as the recording ends, with nobody on the way to it."
     )
 
 
