@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from swarm.model import Base, BaseId, Mission, Origin, Task, TaskId, Uav, UavId, Zone, ZoneId
-from tests.process.by_hand import ByHand
+from tests.process.by_hand import LIMIT_S, ByHand
+from tests.process.mission import wait_until
+from tests.process.programs import run_swarm
 
 pytestmark = [pytest.mark.process]
 
@@ -36,19 +38,34 @@ def paddock() -> Mission:
     )
 
 
-@pytest.mark.parametrize("flavour", ["ardupilot", "px4"])
+def let_start(hand: ByHand) -> list[tuple[int, str]]:
+    """Say that it may start, until that is obeyed; what came of each word."""
+    came: list[tuple[int, str]] = []
+
+    def obeyed() -> bool:
+        said = run_swarm("ready", "uav1", "--mission", "paddock", *hand.seat)
+        came.append((said.returncode, said.stdout + said.stderr))
+        return said.returncode == 0
+
+    wait_until(obeyed, LIMIT_S, "a start")
+    return came
+
+
+@pytest.mark.parametrize(("flavour", "by_itself"), [("ardupilot", False), ("px4", True)])
 def test_killed_while_it_lands_swaps_and_climbs_it_goes_on_each_time(
-    tmp_path: Path, flavour: str
+    tmp_path: Path, flavour: str, by_itself: bool
 ) -> None:
     with contextlib.ExitStack() as stack:
-        hand = ByHand(tmp_path, stack, paddock(), SPEEDUP, flavour=flavour, by_itself=True)
+        hand = ByHand(tmp_path, stack, paddock(), SPEEDUP, flavour=flavour, by_itself=by_itself)
         hand.coordinator("coordinator")
-        moments = (
-            ("uav1", 'event="lands"'),
-            ("uav1-2", "its battery is being changed"),
-            ("uav1-3", "climbing"),
-        )
+        stands = "its battery is being changed" if by_itself else "and then let it start again"
+        moments = (("uav1", 'event="lands"'), ("uav1-2", stands), ("uav1-3", "climbing"))
         for life, (name, moment) in enumerate(moments, 2):
+            if moment == "climbing" and not by_itself:
+                hand.wait_for(name, stands)
+                came = let_start(hand)
+                assert all("stays on the ground: battery at" in text for _, text in came[:-1])
+                assert "uav1 may start again from shed" in came[-1][1]
             hand.wait_for(name, moment)
             os.kill(hand.agents[0].pid, signal.SIGKILL)
             hand.agents[0].wait()

@@ -83,6 +83,7 @@ def test_an_operator_sees_and_commands_a_living_fleet_in_a_browser(flown: ByHand
         all_uavs_move(page)
 
         task = add_a_task_by_a_click(page)
+        draw_a_zone_and_take_it_away(page)
         held_and_resumed(page, "uav1")
 
         # Without its coordinator the fleet, the page and the commands go on.
@@ -136,6 +137,26 @@ def add_a_task_by_a_click(page: Page) -> str:
     expect(page.locator("#panel-tasks tr[data-id=added] .col-by")).to_have_text("operator")
     page.get_by_role("tab", name="Fleet").click()
     return "added"
+
+
+def draw_a_zone_and_take_it_away(page: Page) -> None:
+    """Aside of everything, by clicks on its corners."""
+    page.get_by_role("button", name="+ Zone").click()
+    box = page.locator("#map").bounding_box()
+    assert box is not None
+    for right, down in ((0.35, 0.80), (0.42, 0.80), (0.38, 0.88)):
+        page.mouse.click(box["x"] + right * box["width"], box["y"] + down * box["height"])
+    page.keyboard.press("Enter")
+    page.get_by_label("Id", exact=True).fill("pond")
+    confirm(page, "Draw zone")
+    page.get_by_role("tab", name="Operator").click()
+    drawn = page.get_by_role("button", name="Zone pond ×")
+    expect(drawn).to_have_count(1, timeout=SOON_MS)
+    expect(page.locator("#panel-operator")).to_contain_text("zone pond", timeout=SOON_MS)
+    drawn.click()
+    confirm(page, "Take away")
+    expect(drawn).to_have_count(0, timeout=SOON_MS)
+    page.get_by_role("tab", name="Fleet").click()
 
 
 def task_is_done(page: Page, task: str) -> None:

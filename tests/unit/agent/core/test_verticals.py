@@ -113,6 +113,28 @@ def test_what_the_first_leg_from_the_ground_takes_longer_is_the_climb(script: Sc
     assert calibrations(agent)[-1] == Calibration(1.0, 1.0, 1, LAND_S, CLIMB_S + 5.0)
 
 
+@pytest.mark.parametrize("late", [True, False])
+def test_who_turns_away_from_its_first_leg_when_it_should_be_there_has_climbed_for_longer(
+    script: Script, late: bool
+) -> None:
+    """Else it would set off for the same again and again, and never get there in time."""
+    agent = flying_to_base(script)
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    agent.touch_down(50.0 + LAND_S)
+    script.items = ["t0"]
+    lifts_s = 50.0 + LAND_S + SWAP_S
+    agent.get_full(lifts_s)
+    script.items = ["base:b0"]
+    turns_s = lifts_s + 50.0 + CLIMB_S + (4.0 if late else -4.0)
+    agent.run_until(turns_s)
+    agent.post(entry("t0", 100.0, withdrawn=True))
+
+    assert agent.state() is AgentState.FLYING_TO_BASE
+    climb_s = calibrations(agent)[-1].climb_s
+    assert climb_s == pytest.approx(CLIMB_S + 4.0 + 1.0 if late else CLIMB_S, abs=0.1)
+
+
 def test_without_a_slot_it_lands_beside_them_while_its_battery_pays_for_it(script: Script) -> None:
     agent = flying_to_base(script, "u1")
     agent.hear("u1", visiting(BaseStage.LANDED, 5.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -25,7 +26,7 @@ from agent.core.interface import (
 from agent.vehicle.activity import FlightPhase
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from tests.support.bridge_flight import ORIGIN, BridgeFlight
-from tests.support.fake_copter import ARM, SET_MODE, TAKEOFF, FakeCopter
+from tests.support.fake_copter import ARM, REPOSITION, SET_MODE, TAKEOFF, FakeCopter
 from tests.support.fake_px4 import FakePx4
 
 BASE = (5.0, 0.0, 0.0)
@@ -306,6 +307,65 @@ def test_an_agent_killed_while_it_climbs_from_its_base_takes_it_in_hand(
     flight.run(30.0)
 
     assert flight.bridge.phase is FlightPhase.HOVERING
+
+
+@pytest.mark.parametrize("climbed_m", [0.0, 2.0, 6.0])
+def test_one_left_climbing_far_from_its_start_climbs_on_where_it_is(
+    fake: type[FakeCopter], config: BridgeConfig, climbed_m: float
+) -> None:
+    """A slant from there to its start would lead low over the ground, and over people."""
+    flight = landed(fake, config, percent=99)
+    base_m = (90.0, 40.0, 0.0)
+    flight.copter.position_m = base_m
+    flight.copter.power_on(flight.now_s)
+    flight.run(8.0)
+    flight.order(replace(SWAP, leg=4, position_enu_m=base_m))
+    flight.order(Ready(4))
+    flight.run_until(Swapped(4))
+    flight.order(GoTo(5, (120.0, 40.0, 10.0)))
+    for _ in range(4000):
+        armed, up_m = flight.copter.armed, flight.copter.position_m[2]
+        if armed and up_m >= climbed_m:
+            break
+        flight.step()
+
+    flight.restart(down_s=0.3)
+    flight.order(Prepare(ABOVE, 4.0, resume=True, ground_up_m=0.0, left_in_air=True))
+    flight.run(40.0)
+
+    assert flight.bridge.phase is FlightPhase.HOVERING
+    assert flight.copter.position_m == pytest.approx((90.0, 40.0, 10.0), abs=1.5)
+    recent_m = [each.position_enu_m for each in flight.telemetry[-300:]]
+    assert max(math.dist(place_m[:2], base_m[:2]) for place_m in recent_m) < 1.0
+
+
+def test_one_that_came_down_is_told_to_stand_there_once_its_place_is_known(
+    fake: type[FakeCopter], config: BridgeConfig
+) -> None:
+    flight = landed(fake, config, percent=99)
+    flight.restart()
+    order = Prepare(ABOVE, 4.0, resume=True, ground_up_m=0.0, left_in_air=True)
+    flight.order(order)
+    refused = flight.run_until(Refused)
+
+    assert isinstance(refused, Refused)
+    assert refused.stands
+    assert flight.telemetry[-1].position_enu_m == pytest.approx(BASE, abs=0.5)
+    assert not flight.copter.count()[ARM]
+
+
+def test_one_that_hovers_above_the_fence_comes_into_it_before_it_lands(
+    fake: type[FakeCopter],
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN), BridgeConfig(1, ORIGIN, fence_height_m=100.0)).prepared()
+    flight.copter.position_m = (30.0, 0.0, 104.0)
+    flight.run(6.0)
+    flight.order(SWAP)
+    flight.run(5.0)
+
+    heights_m = [each.z - ORIGIN.alt_m for each in flight.copter.commands(REPOSITION)]
+    assert heights_m
+    assert max(heights_m) <= 100.0
 
 
 def test_a_hold_stops_its_landing_in_the_air(fake: type[FakeCopter], config: BridgeConfig) -> None:
