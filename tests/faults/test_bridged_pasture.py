@@ -86,7 +86,13 @@ def test_a_zone_drawn_across_a_flown_path_is_flown_round(
 
 
 @pytest.mark.parametrize("said", [True, False])
-@OTHER_DIAGONAL
+@pytest.mark.parametrize(
+    ("flavour", "style"),
+    [
+        (FirmwareModelName.ARDUPILOT, CommandStyle.MISSION),
+        (FirmwareModelName.PX4, CommandStyle.REPOSITION),
+    ],
+)
 def test_a_base_that_a_dead_uav_blocks_is_used_again_only_if_the_operator_says_so(
     flavour: FirmwareModelName, style: CommandStyle, said: bool
 ) -> None:
