@@ -362,11 +362,14 @@ class BaseVisits(AgentPart):
         elif self._visit.hopeless_at_s is None:
             self._visit.hopeless_at_s = now_s + self._timing.stalemate_s
 
-    def stand(self, now_s: float) -> bool:
+    def stand(self, now_s: float, *, found: bool = False) -> bool:
         """The vehicle stands at a base already: have its battery looked after from there.
 
-        Whether it does, by its last claim; its battery may be full, which is told at once then.
+        Whether it does, by its last claim, or at whatever base it was ``found``; its battery may be
+        full, which is told at once then.
         """
+        if found:
+            return self._stand_where_found(now_s)
         claim, base = self.claim, self._base()
         if base is None or claim is None or claim.stage is None or claim.stage not in _ON_GROUND:
             return False
@@ -380,11 +383,16 @@ class BaseVisits(AgentPart):
             self._stay(base, claim.stage, now_s)
         return True
 
-    def wait_where_found(self, base: BaseSpec, now_s: float) -> bool:
-        """The vehicle was found on the ground at ``base``: others may have its slot by now."""
-        if not self._machine.take(Trigger.STANDS_AT_BASE):
+    def _stand_where_found(self, now_s: float) -> bool:
+        """The vehicle was found on the ground: whether that is at a base.
+
+        Others may have its slot by now: it waits for one.
+        """
+        base = self._flights.base_here()
+        if base is None or not self._machine.take(Trigger.STANDS_AT_BASE):
             return False
         self._machine.take(Trigger.COMES_DOWN)
+        self._become_free(self._mission_view.mission_s(now_s), False)
         mission_s = self._mission_view.mission_s(now_s)
         stands = Claim(
             *(ClaimPhase.HELD, None, mission_s, 0, mission_s),

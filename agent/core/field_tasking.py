@@ -81,17 +81,9 @@ class FieldTasking(Tasking):
         """The mission is known: tell what is known of the vehicle before it flies."""
         self._flights.meter.introduce()
 
-    def stand(self, now_s: float) -> bool:
-        """Whether the vehicle stands at a base by its last claim: stay there, then."""
-        return self._flights.problem is not None and self._visits.stand(now_s)
-
-    def stand_where_it_is(self, now_s: float) -> bool:
-        """Whether the vehicle is found on the ground at a base: wait for a slot there, then."""
-        base = self._flights.base_here() if self._in_field else None
-        if base is None:
-            return False
-        self._become_free(self._mission_view.mission_s(now_s))
-        return self._visits.wait_where_found(base, now_s)
+    def stand(self, now_s: float, *, found: bool = False) -> bool:
+        """Whether it stands at a base, by its last claim or as it was found: stay there."""
+        return self._flights.problem is not None and self._visits.stand(now_s, found=found)
 
     def zones_changed(self) -> bool:
         """Whether other zones are in force than when this was last asked."""

@@ -141,7 +141,7 @@ class VehicleCommander(AgentPart):
 
         It had not taken off there yet, or has come down there meanwhile.
         """
-        stands = self._left_in_air and self._tasking.stand_where_it_is(now_s)
+        stands = self._left_in_air and self._tasking.stand(now_s, found=True)
         if stands:
             self._log("found on the ground at a base", reason=reason)
         return stands

@@ -9,6 +9,7 @@ Judged: whether the start can be reached from where the vehicle stands.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from agent.core.interface import Prepare
 from agent.vehicle.commands import CommandEnded, CommandOutcome
@@ -25,6 +26,7 @@ from agent.vehicle.messages import (
 )
 from agent.vehicle.session import VehicleSession
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
+from swarm.protocol.fields import Point
 
 _SIMULATED = "SWARM_SIMULATED"
 """Parameter of the autopilots that `swarm autopilot` simulates; no firmware has it."""
@@ -239,6 +241,24 @@ _NULL_ISLAND = ", near 0° N 0° E: a PX4 before 1.16 starts its own simulator t
 def home_alt_m(position: Position) -> float:
     """Home's height above mean sea level, of which the vehicle's two heights differ [m]."""
     return position.alt_m - position.relative_alt_m
+
+
+def aim(order: Prepare, place_enu_m: Point, position: Position) -> Prepare:
+    """That order for a vehicle that an earlier life had take off from where it is.
+
+    That may be far from its start, at a base: it climbs there, as high above its home as it would
+    at its start.
+
+    Args:
+        order: of a start.
+        place_enu_m: where it is [m; mission origin].
+        position: where that is by its own word, and how high above its home.
+    """
+    up_m = order.position_enu_m[2]
+    if order.ground_up_m is not None:
+        home_up_m = place_enu_m[2] - position.relative_alt_m
+        up_m = home_up_m + up_m - order.ground_up_m
+    return replace(order, position_enu_m=(*place_enu_m[:2], up_m), ground_up_m=None)
 
 
 def start_fault(order: Prepare, position: Position, config: BridgeConfig) -> str | None:

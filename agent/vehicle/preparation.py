@@ -17,7 +17,7 @@ agent.vehicle.preflight.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from agent.core.interface import Prepare
 from agent.vehicle.activity import Activity, FlightPhase
@@ -26,7 +26,7 @@ from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.leg import RepositionLeg
 from agent.vehicle.messages import Heartbeat, Inbound, LandedState, Outbound, Position
 from agent.vehicle.onboard_mission import OnboardMission
-from agent.vehicle.preflight import CruiseSpeedSetting, FailsafeCheck, home_alt_m, start_fault
+from agent.vehicle.preflight import CruiseSpeedSetting, FailsafeCheck, aim, home_alt_m, start_fault
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.supervision import PilotConsent
 from swarm.model.frames import wgs84_from_enu
@@ -74,8 +74,7 @@ class _Preparation:
         self._mission = session.mission
         self._config = config
         self._firmware = firmware
-        self._aims = order.left_in_air
-        """Whether it is still to be found out where it climbs, with nobody's order at hand."""
+        self._aims = order.left_in_air  # where it climbs is still to be found out
         self._mode = _Step(
             f"setting {firmware.commanded_mode_name}", session.repeated("mode", config.mode_tries)
         )
@@ -125,12 +124,6 @@ class _Preparation:
     def took_off(self) -> bool:
         """Whether takeoff was asked for."""
         return self._takeoff.command.given > 0
-
-    @property
-    def _start_alt_m(self) -> float:
-        """Height above sea level to which it climbs [m]."""
-        _, _, alt_m = wgs84_from_enu(self._config.origin, self._order.position_enu_m)
-        return alt_m
 
     def on_ended(self, ended: CommandEnded) -> None:
         """Take a command's outcome."""
@@ -258,13 +251,13 @@ class _Preparation:
         if self._flew:
             return self._fail("the vehicle disarmed after takeoff")
         if self._order.left_in_air and not self._arm.command.given:
-            known = vehicle.position is not None  # it may stand where it is to be found
-            return self._fail(_CAME_DOWN) if known else self._wait(_NO_PLACE)
+            return self._wait(_NO_PLACE) if vehicle.position is None else self._fail(_CAME_DOWN)
         if unready := self._firmware.unready(vehicle):
             return self._wait(self._with_warning(unready))
-        if objection := self._arming_objection():
+        if objection := self._session.arming_objection():
             return self._wait(objection)
-        if vehicle.position is not None and (fault := self._start_fault(vehicle.position)):
+        place = vehicle.position
+        if place is not None and (fault := start_fault(self._order, place, self._config)):
             return self._fail(fault)
         if objection := self._failsafes.objection:
             return self._wait(objection)
@@ -273,29 +266,14 @@ class _Preparation:
         self._consent.arm()
         return self._ask(self._arm, self._firmware.arm())
 
-    def _arming_objection(self) -> str | None:
-        session = self._session
-        return session.safety.arming_objection(session.vehicle, session.now_s)
-
-    def _start_fault(self, position: Position) -> str | None:
-        return start_fault(self._order, position, self._config)
+    def _start_alt_m(self) -> float:
+        return wgs84_from_enu(self._config.origin, self._order.position_enu_m)[2]
 
     def _aims_at(self, position: Position) -> bool:
-        """Whether it is known where it climbs.
-
-        One that an earlier life had take off may have done so far from its start, at a base: it
-        climbs where it is, as high above its home as it would at its start.
-        """
-        order, ground_up_m = self._order, self._order.ground_up_m
+        """Whether it is known where it climbs."""
         place_enu_m = self._session.known_place_m()
         if self._aims and place_enu_m is not None:
-            up_m = order.position_enu_m[2]
-            if ground_up_m is not None:
-                home_up_m = place_enu_m[2] - position.relative_alt_m
-                up_m = home_up_m + up_m - ground_up_m
-            aim_enu_m = (*place_enu_m[:2], up_m)
-            self._order = replace(order, position_enu_m=aim_enu_m, ground_up_m=None)
-            self._aims = False
+            self._order, self._aims = aim(self._order, place_enu_m, position), False
         return not self._aims
 
     def _take_off(self, position: Position) -> list[Outbound]:
@@ -305,14 +283,14 @@ class _Preparation:
         self._climbed_at_s = self._session.now_s
         self._highest_m = position.alt_m
         # Also here, as a vehicle found armed on the ground comes straight to takeoff.
-        if objection := self._arming_objection():
+        if objection := self._session.arming_objection():
             return self._wait(objection)
-        if fault := self._start_fault(position):
+        if fault := start_fault(self._order, position, self._config):
             return self._fail(fault)
         if self._mission is not None and not self._mission.is_uploaded and not self.took_off:
             return self._upload_way_home(self._mission)
         self._session.launched_enu_m = self._session.known_place_m()
-        command = self._firmware.takeoff(self._start_alt_m, home_alt_m(position))
+        command = self._firmware.takeoff(self._start_alt_m(), home_alt_m(position))
         return self._ask(self._takeoff, command)
 
     def _follow_takeoff(self) -> None:
@@ -330,11 +308,12 @@ class _Preparation:
             self.failure = _CLIMB_STOPPED
 
     def _high_enough(self, position: Position) -> bool:
-        height_m = self._start_alt_m - home_alt_m(position)
+        start_alt_m = self._start_alt_m()
+        height_m = start_alt_m - home_alt_m(position)
         tolerance_m = max(
             self._config.acceptance_radius_m, _CLIMB_TOLERANCE_M, _CLIMB_TOLERANCE_FRAC * height_m
         )
-        if position.alt_m >= self._start_alt_m - tolerance_m:
+        if position.alt_m >= start_alt_m - tolerance_m:
             return True
         self.waiting_for = f"climbing to {height_m:.0f} m"
         if self._session.now_s - self._climbed_at_s > self._config.climb_timeout_s:

@@ -95,6 +95,10 @@ class VehicleSession(Conversation):
         """Where the vehicle is, as far as that counts and is fresh [m; mission origin]."""
         return self.position_filter.place_m(self.now_s - self.config.stream_timeout_s)
 
+    def arming_objection(self) -> str | None:
+        """Why its motors must not be started, in words; None if they may."""
+        return self.safety.arming_objection(self.vehicle, self.now_s)
+
     def way_objection(self, way_enu_m: Sequence[Point]) -> str | None:
         """Why that way must not be flown from where the vehicle is, in words; None if it may."""
         if not self.guard:

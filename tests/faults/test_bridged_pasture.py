@@ -167,7 +167,8 @@ def type_of_landing(fleet: PastureFleet, uav: str) -> type:
 def test_a_battery_that_drains_twice_as_fast_is_changed_in_time(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
-    plain = PastureFleet(flavour, style, mission=pasture(300.0)).fly(LIMIT_S)
+    plain = PastureFleet(flavour, style, mission=pasture(300.0))
+    plain.fly(LIMIT_S)
     fleet = PastureFleet(flavour, style, mission=pasture(300.0), drain=2.0)
     fleet.fly(LIMIT_S)
 
