@@ -1,5 +1,8 @@
 """What one UAV's agent measures of its flight: times of legs, drain, and how it lands and climbs.
 
+**Acceleration and speed** by the vehicle's parameters are told as soon as it has said them, which
+it does before it takes off.
+
 **Landing and climbing** are known for a vehicle before it has flown, and told at once, as plans
 need them; measured they count from the order to land to `Landed`, and as what the first leg from
 the ground takes longer. What takes longer than was known is believed at once.
@@ -9,9 +12,9 @@ the ground takes longer. What takes longer than was known is believed at once.
 one that began on the ground. **The drain** counts over each
 `_SPAN_FRAC` of the charge used in one flight, hovering included.
 
-Each of these two is a share of the prediction by the brief, and has one vote among the last
-`_WINDOW` in a running median, which begins with `_PRIOR` votes for what is known already. So one
-leg or two change little, an odd one nothing, and after four the estimate is what was measured.
+Each of these two is a share of the prediction by brief and parameters, and has one vote among the
+last `_WINDOW` in a running median, which begins with `_PRIOR` votes for what is known already. So
+one leg or two change little, an odd one nothing, and after four the estimate is what was measured.
 Votes that nobody would believe are none. What is told of it in
 the own register moves in steps of `STEP_FRAC` or more, so that neither decisions nor problems
 change with each leg. A later life begins with what the register says.
@@ -26,12 +29,13 @@ Leaves out: what follows (swarm.protocol.calibration, and agent.core.field_taski
 from __future__ import annotations
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass, replace
 from statistics import median
 from typing import Final
 
 from agent.core.context import AgentContext, AgentPart
 from agent.core.energy import SortieClock
+from agent.core.interface import FlightLimits
 from agent.core.states import AgentState
 from swarm.protocol.calibration import (
     AS_BRIEFED,
@@ -159,7 +163,23 @@ class FlightMeter(AgentPart):
             height_m, legs = me.layer_m, 0 if before is None else before.legs
             land_s = round(self._verticals.land_s(height_m), 1)
             climb_s = round(self._verticals.climb_s(height_m), 1)
-            self._say(Calibration(told.time_frac, told.drain_frac, legs, land_s, climb_s))
+            self._say(_calibration(replace(told, land_s=land_s, climb_s=climb_s), legs))
+
+    def heed_limits(self, limits: FlightLimits) -> None:
+        """The vehicle flies so by its parameters: tell it, if that matters in this mission."""
+        brief, me, told = self._replica.brief, self._mission_view.me, self._told
+        if brief is None or me is None or not is_calibrated(brief):
+            return
+        before = self._replica.calibrations.get(self._uav)
+        limited = Calibration(1.0, 1.0, 0, 0.0, 0.0, limits.acceleration_m_s2, limits.speed_m_s)
+        read = FlightRates.believed(limited, me)
+        acceleration_m_s2 = _limit_anew(told.acceleration_m_s2, read.acceleration_m_s2)
+        speed_m_s = _limit_anew(told.speed_m_s, read.speed_m_s)
+        now = replace(told, acceleration_m_s2=acceleration_m_s2, speed_m_s=speed_m_s)
+        if now != told:
+            self._say(_calibration(now, 0 if before is None else before.legs))
+            found = {"acceleration_m_s2": acceleration_m_s2, "speed_m_s": speed_m_s}
+            self._log("flies by its parameters", **found)
 
     # -- legs --------------------------------------------------------------------------
 
@@ -193,7 +213,8 @@ class FlightMeter(AgentPart):
         self.sortie.heed(self.rates.drain_frac, self._mission_view.mission_s(now_s))
 
     def depart(self, leg: int, predicted_s: float | None = None) -> None:
-        """It sets off now, and should take so long by the brief; None: nobody can tell."""
+        """It sets off now, and should take so long by the brief and its parameters; None: nobody
+        can tell."""
         self._note_late_climb()
         at_rest, self._at_rest, self._departure, self._leg = self._at_rest, False, None, leg
         stands, self._stands = self._stands, False
@@ -267,7 +288,9 @@ class FlightMeter(AgentPart):
 
     @property
     def _told(self) -> FlightRates:
-        return FlightRates.believed(self._replica.calibrations.get(self._uav))
+        me = self._mission_view.me
+        told = self._replica.calibrations.get(self._uav)
+        return AS_BRIEFED if me is None else FlightRates.believed(told, me)
 
     @property
     def _medians(self) -> _Estimates:
@@ -294,20 +317,33 @@ class FlightMeter(AgentPart):
     def _tell(self) -> None:
         """State the register anew, if the estimates have moved by a step."""
         told, found = self._told, self._medians
-        now = FlightRates(
-            told_anew(told.time_frac, found.times.value, TIME_FRAC_RANGE),
-            told_anew(told.drain_frac, found.drains.value, DRAIN_FRAC_RANGE),
-            _vertical_anew(told.land_s, found.landings),
-            _vertical_anew(told.climb_s, found.climbs),
+        now = replace(
+            told,
+            time_frac=told_anew(told.time_frac, found.times.value, TIME_FRAC_RANGE),
+            drain_frac=told_anew(told.drain_frac, found.drains.value, DRAIN_FRAC_RANGE),
+            land_s=_vertical_anew(told.land_s, found.landings),
+            climb_s=_vertical_anew(told.climb_s, found.climbs),
         )
         if now == told:
             return
         legs = self._legs_before + found.times.count
-        self._say(Calibration(now.time_frac, now.drain_frac, legs, now.land_s, now.climb_s))
+        self._say(_calibration(now, legs))
         upright: dict[str, object] = {"land_s": now.land_s, "climb_s": now.climb_s}
         upright = {} if self._verticals is None else upright
         fracs = {"time_frac": now.time_frac, "drain_frac": now.drain_frac}
         self._log("calibrated", **fracs, legs=legs, **upright)
+
+
+def _calibration(rates: FlightRates, legs: int) -> Calibration:
+    """What is told of these rates, which rest on so many legs."""
+    return Calibration(legs=legs, **asdict(rates))
+
+
+def _limit_anew(told: float | None, read: float | None) -> float | None:
+    """What to tell of a parameter: what was told before, unless it is another one."""
+    if told is not None and read is not None and abs(read / told - 1.0) < STEP_FRAC:
+        return told
+    return None if read is None else float(f"{read:.3g}")
 
 
 def _vertical_anew(told_s: float, found: RunningMedian) -> float:

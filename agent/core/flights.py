@@ -289,12 +289,23 @@ class Flights(AgentPart):
         return float(problem.network.time_frac[self._row(problem)])
 
     def _straight_s(self, stop_enu_m: Point) -> float | None:
-        """Time of a straight leg from where the UAV is, by the brief [s]; None: nobody can tell."""
-        me, place_enu_m = self._mission_view.me, self._mission_view.place_enu_m
-        if me is None or place_enu_m is None or me.acceleration_m_s2 is None:
+        """Time of a straight leg from where the UAV is, by brief and parameters [s].
+
+        None: nobody can tell.
+        """
+        me, place_enu_m, rates = (
+            self._mission_view.me,
+            self._mission_view.place_enu_m,
+            self.meter.rates,
+        )
+        if me is None or place_enu_m is None:
+            return None
+        speed_m_s = rates.speed_m_s or me.speed_m_s
+        acceleration_m_s2 = rates.acceleration_m_s2 or me.acceleration_m_s2
+        if acceleration_m_s2 is None:
             return None
         length_m = np.array([math.dist(place_enu_m, stop_enu_m)])
-        return float(rest_to_rest_s(length_m, me.speed_m_s, me.acceleration_m_s2)[0])
+        return float(rest_to_rest_s(length_m, speed_m_s, acceleration_m_s2)[0])
 
     def _flown(self, task: TaskEntry, point: Point) -> Point:
         if task.height_m is not None:

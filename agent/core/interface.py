@@ -154,6 +154,20 @@ class Caution:
 
 
 @dataclass(frozen=True, slots=True)
+class FlightLimits:
+    """How the vehicle flies by what is set on it; said before it takes off, as plans need it.
+
+    Vehicles of the simulator's ideal world say nothing: they fly as they are told.
+    """
+
+    acceleration_m_s2: float | None = None
+    """A leg from rest to rest takes length / speed + speed / this, with what its limit of jerk
+    costs; None: not known, or as good as endless."""
+    speed_m_s: float | None = None
+    """It flies no faster over ground; None: not known."""
+
+
+@dataclass(frozen=True, slots=True)
 class Arrived:
     """The vehicle is at the target of that leg and has stopped there."""
 
@@ -262,6 +276,7 @@ VehicleReport = (
     VehicleReady
     | NotReady
     | Caution
+    | FlightLimits
     | Arrived
     | Landed
     | Swapped

@@ -12,6 +12,7 @@ from agent.core.interface import (
     Arrived,
     AttemptFailed,
     Caution,
+    FlightLimits,
     GoTo,
     HandedOver,
     HandOverExplained,
@@ -93,6 +94,8 @@ class VehicleCommander(AgentPart):
                 if self._machine.state in TAKES_TARGETS:  # else the note says what it waits for
                     self._announcer.explain(reason)
                 self._log("caution", reason=reason)
+            case FlightLimits():
+                self._tasking.heed_limits(report)
             case Arrived(leg):
                 self._tasking.arrive(leg, now_s)
             case Landed(leg):

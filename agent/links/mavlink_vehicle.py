@@ -85,8 +85,9 @@ class MavlinkVehicle:
 
     @property
     def dropped(self) -> Mapping[str, int]:
-        """Frames dropped so far, by reason."""
+        """What was dropped so far, by reason: frames, and parameters."""
         dropped = self._disbelieved()
+        dropped["absurd parameters"] = self.bridge.absurd_parameters
         dropped["not forwarded"] = self._forwarding.dropped
         return +dropped
 

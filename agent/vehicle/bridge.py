@@ -100,6 +100,11 @@ class Bridge:
         return self._session.contact
 
     @property
+    def absurd_parameters(self) -> int:
+        """How many parameters of the vehicle have values that nobody would believe."""
+        return len(self._session.absurd_parameters)
+
+    @property
     def silent(self) -> bool:
         """Whether the vehicle has not been heard for too long, at the last step."""
         return self._session.silent

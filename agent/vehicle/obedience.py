@@ -118,7 +118,7 @@ def begin_preparing(activity: Activity, order: Prepare, session: VehicleSession)
     session.forget_mission()
     session.safety.begin()
     session.cruise_speed_m_s = order.speed_m_s
-    session.acceleration_m_s2 = order.acceleration_m_s2 or session.acceleration_m_s2
+    session.planned_m_s2 = order.acceleration_m_s2
     session.sent_to_enu_m.append(order.position_enu_m)
     session.tell_anew()
     return Preparing(session, order, ours=ours)

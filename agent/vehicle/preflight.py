@@ -18,25 +18,18 @@ from agent.vehicle.firmware.failsafes import Failsafes
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import (
     Inbound,
-    ParameterMissing,
     ParameterRead,
     ParameterSet,
     ParameterValue,
     Position,
 )
+from agent.vehicle.parameter_reading import PAUSE_TIMEOUTS, TRIES, ParameterReading
 from agent.vehicle.session import VehicleSession
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
 from swarm.protocol.fields import Point
 
 _SIMULATED = "SWARM_SIMULATED"
 """Parameter of the autopilots that `swarm autopilot` simulates; no firmware has it."""
-
-_PAUSE_TIMEOUTS = 0.5
-"""A parameter is asked for again after that many timeouts of a command: reading does no harm..."""
-
-_TRIES = 20
-"""...and so often before it counts as not known: one that a poor link loses keeps the vehicle on
-the ground, and older firmware does not say that it has none of that name."""
 
 
 class FailsafeReading:
@@ -53,46 +46,34 @@ class FailsafeReading:
         self._firmware = firmware
         self._own_system_id = own_system_id
         self._may_be_simulated = may_be_simulated
-        self._values: dict[str, float] = {}
-        self._missing: set[str] = set()
-        self.names = (*(name for names in firmware.failsafe_names for name in names), _SIMULATED)
+        names = (name for names in firmware.failsafe_names for name in names)
+        self._parameters = ParameterReading(firmware, (*names, _SIMULATED))
+        self.names = self._parameters.names
         """All that may be read."""
 
     @property
     def unread(self) -> tuple[str, ...]:
         """Names that have been neither told nor denied; none of a parameter that is told."""
-        if self.simulated:
-            return ()
-        return tuple(
-            name
-            for names in self._wanted
-            if not any(each in self._values for each in names)
-            for name in names
-            if name not in self._missing
-        )
+        return () if self.simulated else self._parameters.unread(self._wanted)
 
     @property
     def failsafes(self) -> Failsafes:
         """What the vehicle does, as far as it has told."""
-        return self._firmware.failsafes(self._values, self._own_system_id)
+        return self._firmware.failsafes(self._parameters.values, self._own_system_id)
 
     @property
     def simulated(self) -> bool:
         """Whether it is one of our simulated autopilots."""
-        return bool(self._values.get(_SIMULATED))
+        return bool(self._parameters.values.get(_SIMULATED))
 
     def on_message(self, message: Inbound) -> None:
         """Take a parameter's value, or that there is none."""
-        if isinstance(message, ParameterValue) and message.name in self.names:
-            self._values[message.name] = self._firmware.value_of(message)
-        elif isinstance(message, ParameterMissing) and message.name in self.names:
-            self._missing.add(message.name)
+        self._parameters.on_message(message)
 
     @property
     def _wanted(self) -> tuple[tuple[str, ...], ...]:
         """What is to be read; whether it is simulated only where something is amiss."""
-        own = self._firmware.failsafe_names
-        told = self._firmware.failsafes(self._values, self._own_system_id)
+        own, told = self._firmware.failsafe_names, self.failsafes
         fine = told.comes_home and told.battery is None
         return (*own, (_SIMULATED,)) if self._may_be_simulated and not fine else own
 
@@ -121,9 +102,9 @@ class FailsafeCheck:
         self._settled |= not names
         if now_s < self._next_s:
             return
-        self._settled |= self._tries >= _TRIES
+        self._settled |= self._tries >= TRIES
         self._tries += 1
-        pause_s = _PAUSE_TIMEOUTS * self._config.commands.ack_timeout_s
+        pause_s = PAUSE_TIMEOUTS * self._config.commands.ack_timeout_s
         if self._settled:
             # What keeps the vehicle on the ground may still come, or be set meanwhile.
             pause_s = self._config.retry_delay_s

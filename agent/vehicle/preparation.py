@@ -23,6 +23,7 @@ from agent.core.interface import Prepare
 from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import CommandEnded, RepeatedCommand, VehicleCommand, result_text
 from agent.vehicle.firmware.profile import Firmware
+from agent.vehicle.flight_limits import LimitsCheck
 from agent.vehicle.leg import RepositionLeg
 from agent.vehicle.messages import Heartbeat, Inbound, LandedState, Outbound, Position
 from agent.vehicle.onboard_mission import OnboardMission
@@ -98,6 +99,7 @@ class _Preparation:
         self._barred: bool | None = None
         self._speed = CruiseSpeedSetting(order.speed_m_s, firmware, session)
         self._failsafes = FailsafeCheck(firmware, session)
+        self._limits = LimitsCheck(firmware, session, order.speed_m_s)
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
         self.done = False
@@ -108,7 +110,8 @@ class _Preparation:
     @property
     def caution(self) -> str | None:
         """What people should know of a vehicle that is armed all the same."""
-        return self._failsafes.caution
+        parts = (self._limits.caution, self._failsafes.caution)
+        return "; ".join(part for part in parts if part is not None) or None
 
     @property
     def disturbed(self) -> bool:
@@ -136,6 +139,7 @@ class _Preparation:
     def on_message(self, message: Inbound) -> None:
         """Take what matters of a message beside the vehicle's state."""
         self._failsafes.on_message(message)
+        self._limits.on_message(message)
         if self._leg is not None:
             self._leg.on_message(message)
         self._speed.on_message(message)
@@ -156,6 +160,7 @@ class _Preparation:
         if not firmware.has_booted(heartbeat):
             self.waiting_for = self._booting(heartbeat)
             return
+        self._limits.ask()
         self._consent.on_heartbeat(heartbeat)
         if self._mission is not None and self._mission_begun:
             self._follow_mission(self._mission, heartbeat)

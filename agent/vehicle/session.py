@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
-from agent.core.interface import VehicleOrder
+from agent.core.interface import FlightLimits, VehicleOrder
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.contact import Contact
 from agent.vehicle.conversation import Conversation
@@ -58,7 +58,7 @@ POLL_S = 0.25
 _PLACES = 2
 
 _ACCELERATION_M_S2 = 2.5
-"""Of a vehicle of which the mission does not tell it: ArduCopter's own."""
+"""Of a vehicle of which neither mission nor parameters tell it: ArduCopter's own."""
 
 
 class VehicleSession(Conversation):
@@ -77,8 +77,14 @@ class VehicleSession(Conversation):
         """What is another parameter during a flight; None if nothing is."""
         self.cruise_speed_m_s = 0.0
         """Of the last preparation; 0 before the first."""
-        self.acceleration_m_s2 = _ACCELERATION_M_S2
-        """With which it is reckoned to brake and to speed up."""
+        self.planned_m_s2: float | None = None
+        """Acceleration that the mission counts on; None: it says none."""
+        self.set_m_s2: float | None = None
+        """Acceleration that is set on the vehicle; None: not known, or endless."""
+        self.told_limits = FlightLimits()
+        """How it flies by its parameters, as was told last."""
+        self.absurd_parameters: set[str] = set()
+        """Names of those whose values nobody would believe."""
         self.guard = ZoneGuard(config.zones, config.zone_margin_m)
         """Where not to fly."""
         self.launched_enu_m: Point | None = None
@@ -90,6 +96,11 @@ class VehicleSession(Conversation):
         """Where the vehicle is, by its newest position [m; mission origin]."""
         self.sent_to_enu_m: deque[Point] = deque(maxlen=_PLACES)
         """Where the vehicle was last told to fly: of the newest it may not have heard."""
+
+    @property
+    def acceleration_m_s2(self) -> float:
+        """With which it is reckoned to brake and to speed up."""
+        return self.planned_m_s2 or self.set_m_s2 or _ACCELERATION_M_S2
 
     def known_place_m(self) -> Point | None:
         """Where the vehicle is, as far as that counts and is fresh [m; mission origin]."""

@@ -7,6 +7,7 @@ with the detail that an explanation adds if one is wanted.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import replace
 
 from coordinator.mission_view.pace import PacedClock
 from coordinator.mission_view.reasons import Reasons
@@ -143,11 +144,8 @@ class MissionNarrator:
                 self._hear_claim(message.writer, body, claim, now_s)
             case Outcome():
                 self._hear_outcome(message.writer, body, now_s)
-            case Calibration() if self._is_calibrated and _flies_otherwise(body, earlier):
-                text = f"{message.writer} {rates_in_words(FlightRates.believed(body))}"
-                detail = f", as {counted(body.legs, 'leg')} show"
-                uavs = [message.writer]
-                self.tell(EventKind.CALIBRATED, text, now_s, detail=detail, uavs=uavs)
+            case Calibration():
+                self._hear_calibration(message.writer, body, earlier, now_s)
             case OperatorCommand() if in_force(self._replica).get(body.target) == body:
                 fleet = body.kind is CommandKind.ABORT
                 uavs = self._fleet() if fleet else [body.target]
@@ -164,6 +162,26 @@ class MissionNarrator:
                 self.tell(EventKind.COMMAND, text, now_s, uavs=[body.uav])
             case _:
                 pass
+
+    def _hear_calibration(
+        self, uav: str, told: Calibration, earlier: Message | None, now_s: float
+    ) -> None:
+        """Tell that a UAV flies otherwise than before, however long it lands or climbs."""
+        brief = self._replica.brief
+        if brief is None or not is_calibrated(brief):
+            return
+        briefed = next((each for each in brief.uavs if each.id == uav), None)
+        if briefed is None:
+            return
+        said = None if earlier is None else earlier.body
+        known = FlightRates.believed(said if isinstance(said, Calibration) else None, briefed)
+        now = FlightRates.believed(told, briefed)
+        if replace(now, land_s=known.land_s, climb_s=known.climb_s) == known:
+            return
+        measured = not (now.as_measured and known.as_measured)
+        detail = f", as {counted(told.legs, 'leg')} show" if measured else ""
+        text = f"{uav} {rates_in_words(now)}"
+        self.tell(EventKind.CALIBRATED, text, now_s, detail=detail, uavs=[uav])
 
     def _hear_entry(self, entry: TaskEntry, earlier: Message | None, now_s: float) -> None:
         task = entry.task
@@ -329,12 +347,6 @@ class MissionNarrator:
         self.tell(EventKind.NOTE, text, now_s)
 
     @property
-    def _is_calibrated(self) -> bool:
-        """Whether what UAVs measure counts."""
-        brief = self._replica.brief
-        return brief is not None and is_calibrated(brief)
-
-    @property
     def _phase(self) -> MissionPhase:
         epoch = self._replica.epoch
         return MissionPhase.PREPARING if epoch is None else epoch.phase
@@ -342,14 +354,6 @@ class MissionNarrator:
     def _fleet(self) -> list[str]:
         brief = self._replica.brief
         return [] if brief is None else [uav.id for uav in brief.uavs]
-
-
-def _flies_otherwise(told: Calibration, earlier: Message | None) -> bool:
-    """Whether a UAV flies otherwise than it told before, however long it lands or climbs."""
-    before = None if earlier is None else earlier.body
-    known = FlightRates.believed(before if isinstance(before, Calibration) else None)
-    now = FlightRates.believed(told)
-    return (known.time_frac, known.drain_frac) != (now.time_frac, now.drain_frac)
 
 
 _SILENT = ", silent though its link is up"

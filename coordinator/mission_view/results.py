@@ -46,7 +46,7 @@ class MissionResult:
     """Tasks that the operator has added to the scenario's, whatever became of them."""
     done_by: Mapping[TaskId, UavId] = field(default_factory=dict)
     rates: Mapping[str, FlightRates] = field(default_factory=dict)
-    """UAVs that flew otherwise than planned, by what they have measured themselves."""
+    """UAVs that flew otherwise than the brief says, by their parameters or as they measured."""
 
     @property
     def is_complete(self) -> bool:
@@ -310,7 +310,7 @@ def deviations(mission: Mission, result: MissionResult) -> list[ReportFact]:
     if popups:
         text = f"{counted(len(popups), 'task')} unknown to the plan"
         found.append(ReportFact("pop-ups", text, popups))
-    otherwise = [item for item in sorted(result.rates.items()) if not item[1].as_briefed]
+    otherwise = [item for item in sorted(result.rates.items()) if not item[1].as_measured]
     if otherwise:
         text = f"{counted(len(otherwise), 'UAV')} otherwise than planned"
         how = tuple(f"{uav} {rates_in_words(each)}" for uav, each in otherwise)

@@ -150,10 +150,14 @@ def visit_in_words(claim: Claim, before: Claim | None) -> str | None:
 
 
 def rates_in_words(rates: FlightRates) -> str:
-    """How a UAV flies, by what was measured, beside what the mission says of it."""
+    """How a UAV flies, by its parameters and as measured, beside what the mission says of it."""
     if rates.as_briefed:
         return "flies as planned again"
     parts = []
+    if rates.acceleration_m_s2 is not None:
+        parts.append(f"speeds up and brakes with {rates.acceleration_m_s2:.3g} m/s²")
+    if rates.speed_m_s is not None:
+        parts.append(f"flies at most {rates.speed_m_s:.3g} m/s")
     if rates.time_frac != 1.0:
         parts.append(f"takes {rates.time_frac:g} times as long as planned")
     if rates.drain_frac != 1.0:

@@ -81,6 +81,8 @@ def _uav_as_json(uav: UavView) -> dict[str, Any]:
         "link_age_s": uav.link_age_s,
         "time_frac": uav.rates.time_frac,
         "drain_frac": uav.rates.drain_frac,
+        "acceleration_m_s2": uav.rates.acceleration_m_s2,
+        "speed_limit_m_s": uav.rates.speed_m_s,
         "note": uav.note,
         "dropped": dict(uav.dropped),
     }
@@ -111,7 +113,8 @@ def status_table(scene: Scene, width: int, signs: Signs) -> RenderableType:
         facts.add_row("operator", _line(zone_said(edit), signs))
     for uav in scene.uavs:
         if not uav.rates.as_briefed:
-            facts.add_row("measured", _line(f"{uav.id} {rates_in_words(uav.rates)}", signs))
+            told = "parameters" if uav.rates.as_measured else "measured"
+            facts.add_row(told, _line(f"{uav.id} {rates_in_words(uav.rates)}", signs))
     parts: list[RenderableType] = [mission_title(scene, width, 1.0, signs), facts, ""]
     parts.append(_fleet(scene, signs))
     if any(uav.note for uav in scene.uavs):

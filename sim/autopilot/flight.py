@@ -5,8 +5,9 @@ from __future__ import annotations
 import math
 from enum import Enum
 
+from agent.vehicle.firmware.kinematics import JerkCost
 from sim.autopilot.config import VehicleConfig
-from sim.autopilot.parameters import ParameterRole, ParameterTable
+from sim.autopilot.parameters import ENDLESS, ParameterRole, ParameterTable
 from sim.world.motion import Motion, Point
 
 
@@ -76,7 +77,13 @@ class Milestone(Enum):
 class FlightStateMachine:
     """One activity at a time, each with the instant at which it ends by itself."""
 
-    def __init__(self, config: VehicleConfig, parameters: ParameterTable, motion: Motion) -> None:
+    def __init__(
+        self,
+        config: VehicleConfig,
+        parameters: ParameterTable,
+        motion: Motion,
+        jerk_cost_s: JerkCost,
+    ) -> None:
         self.activity = MotionPhase.GROUNDED
         self.home_enu_m: Point = config.start_enu_m
         """Where the vehicle returns to and heights are counted from [m]."""
@@ -84,6 +91,8 @@ class FlightStateMachine:
         self._grounds_enu_m = config.grounds_enu_m or (config.start_enu_m,)
         self._descent_m_s = config.descent_m_s
         self._spool_up_s = config.spool_up_s
+        self._takes_time = config.acceleration_m_s2 is not None
+        self._jerk_cost_s = jerk_cost_s
         self._touchdown_s = config.touchdown_s
         self._take_off_up_m = 0.0
         self._parameters = parameters
@@ -294,11 +303,25 @@ class FlightStateMachine:
         self._fly(target_enu_m, speed_m_s, now_s)
 
     def _fly(self, target_enu_m: Point, speed_m_s: float, now_s: float) -> None:
+        if self.activity in (MotionPhase.NAVIGATING, MotionPhase.RETURNING):
+            top_m_s = self._parameters.value_si(ParameterRole.TOP_SPEED_M_S)
+            speed_m_s = max(_LEAST_SPEED_M_S, min(speed_m_s, top_m_s))
         self._order = target_enu_m, speed_m_s
+        if self._takes_time:
+            self.motion.limit(self._acceleration_m_s2(speed_m_s))
         if self.activity in self._hindered:
             self.motion.stop(now_s)
         else:
             self.motion.fly_to(target_enu_m, speed_m_s, now_s)
+
+    def _acceleration_m_s2(self, speed_m_s: float) -> float:
+        """With which a leg takes as long as with acceleration and jerk of the parameters."""
+        set_m_s2 = self._parameters.value_si(ParameterRole.ACCELERATION_M_S2)
+        jerk_m_s3 = self._parameters.value_si(ParameterRole.JERK_M_S3)
+        if jerk_m_s3 >= ENDLESS:
+            return set_m_s2
+        ramps_s = speed_m_s / set_m_s2 + self._jerk_cost_s(speed_m_s, set_m_s2, jerk_m_s3)
+        return speed_m_s / ramps_s
 
     def _stopped_enu_m(self, now_s: float) -> Point:
         """Where the vehicle comes to a stop if it brakes now [m]."""

@@ -34,11 +34,20 @@ class ParameterRole(Enum):
     DISARM_LANDED_S = "disarm delay after landing"
     TAKE_OFF_HEIGHT_M = "take-off height"
     CORNER_RADIUS_M = "corner radius"
+    ACCELERATION_M_S2 = "acceleration"
+    JERK_M_S3 = "jerk"
+    TOP_SPEED_M_S = "top speed"
 
 
 _FOLLOWED = {ParameterRole.TAKE_OFF_M_S: ParameterRole.CLIMB_M_S}
 """Settings that go by another one where the firmware has no parameter for them."""
-_DEFAULTS_SI = {ParameterRole.DISARM_LANDED_S: 0.0, ParameterRole.TAKE_OFF_HEIGHT_M: 0.0}
+ENDLESS = 1e6
+"""Value of a limit that there is not."""
+_DEFAULTS_SI = {
+    ParameterRole.DISARM_LANDED_S: 0.0,
+    ParameterRole.TAKE_OFF_HEIGHT_M: 0.0,
+    ParameterRole.TOP_SPEED_M_S: ENDLESS,
+}
 """Values of settings where the firmware has no parameter for them."""
 
 

@@ -59,7 +59,8 @@ class Pilot:
         self.parameter_server = ParameterServer(parameters, outbox, flavour.parameter_habits)
         self.narrator = Narrator(outbox, flavour, config.system_id)
         self.readiness = Readiness(config.delays, boot_s)
-        self.flight = FlightStateMachine(config, self.parameters, config.motion())
+        motion = config.motion()
+        self.flight = FlightStateMachine(config, self.parameters, motion, flavour.jerk_cost_s)
         self.store = store
         self.run = MissionRun(self)
         self.mode = flavour.modes.at_boot

@@ -110,11 +110,7 @@ class TurningMotion:
     """
 
     def __init__(self, start_enu_m: Point, acceleration_m_s2: float) -> None:
-        if not 0.0 < acceleration_m_s2 < math.inf:
-            raise ValueError(
-                f"acceleration must be positive and finite, not {acceleration_m_s2} m/s²"
-            )
-        self._limit_m_s2 = acceleration_m_s2
+        self.limit(acceleration_m_s2)
         self._leg = _OrderedWay(start_enu_m, start_enu_m, 0.0)
         self._ordered = False
 
@@ -175,3 +171,15 @@ class TurningMotion:
         self._leg = _OrderedWay(
             here, plus(here, _scaled(direction, way_m)), now_s, ((direction, way),)
         )
+
+    def limit(self, acceleration_m_s2: float) -> None:
+        """From the next order on, speeds change with that acceleration.
+
+        Raises:
+            ValueError: it is not positive and finite.
+        """
+        if not 0.0 < acceleration_m_s2 < math.inf:
+            raise ValueError(
+                f"acceleration must be positive and finite, not {acceleration_m_s2} m/s²"
+            )
+        self._limit_m_s2 = acceleration_m_s2

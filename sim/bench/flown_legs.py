@@ -16,6 +16,7 @@ from typing import Any
 
 from swarm.allocation import field
 from swarm.model import Mission, Task, TaskId, UavId
+from swarm.protocol.calibration import FlightRates, fleet_as_told
 from swarm.protocol.fields import Point
 from swarm.runtime.errors import Fault, InputError
 
@@ -35,7 +36,8 @@ class FlownLeg:
     speed_m_s: float
     """Cruise speed that the UAV was told."""
     planned_s: float
-    """By the kinematic model: acceleration, wind and zones, as the scenario has them."""
+    """By the kinematic model: acceleration, wind and zones, as the scenario has them; where it
+    gives none, acceleration and greatest speed as the vehicles said in that flight."""
     flown_s: float
 
     @property
@@ -114,7 +116,13 @@ def legs_flown(mission: Mission, run: Mapping[str, Any], source: str) -> list[Fl
     if strangers:
         problem = f"{strangers[0]!r} is not in the scenario {mission.name}"
         raise InputError(Fault(source, "executed_schedule", problem, _REMEDY))
-    reckoned = field.FieldProblem.from_mission(mission)
+    told = {
+        uav: FlightRates(
+            acceleration_m_s2=rates.get("acceleration_m_s2"), speed_m_s=rates.get("speed_m_s")
+        )
+        for uav, rates in run.get("calibration", {}).items()
+    }
+    reckoned = field.FieldProblem.from_mission(fleet_as_told(mission, told))
     return [
         leg
         for uav, entries in schedule.items()

@@ -85,6 +85,10 @@ class Motion(Protocol):
         """Stay where the vehicle is."""
         ...
 
+    def limit(self, acceleration_m_s2: float) -> None:
+        """From the next order on, speeds change with that acceleration where they take time."""
+        ...
+
 
 def flown_s(length_m: float, speed_m_s: float, acceleration_m_s2: float | None) -> float:
     """Time of a leg as plans have it, from rest to rest [s]; None: speed changes at once."""
@@ -162,6 +166,9 @@ class IdealMotion:
         """Stay where the vehicle is."""
         self.target_enu_m = self.position_enu_m(now_s)
         self.arrives_s = None
+
+    def limit(self, acceleration_m_s2: float) -> None:
+        """Nothing: speeds change at once, or as each order says."""
 
 
 _SAME_WAY = 1e-6
@@ -309,11 +316,7 @@ class SmoothMotion:
     """
 
     def __init__(self, start_enu_m: Point, acceleration_m_s2: float) -> None:
-        if not 0.0 < acceleration_m_s2 < math.inf:
-            raise ValueError(
-                f"acceleration must be positive and finite, not {acceleration_m_s2} m/s²"
-            )
-        self._acceleration_m_s2 = acceleration_m_s2
+        self.limit(acceleration_m_s2)
         self._path = _Path(start_enu_m, start_enu_m, 0.0)
         self._ordered = False
 
@@ -356,6 +359,18 @@ class SmoothMotion:
         target_enu_m = here if brake is None else plus(here, brake.end_m)
         self._path = _Path(here, target_enu_m, now_s, () if brake is None else (brake,))
         self._ordered = False
+
+    def limit(self, acceleration_m_s2: float) -> None:
+        """From the next order on, speeds change with that acceleration.
+
+        Raises:
+            ValueError: it is not positive and finite.
+        """
+        if not 0.0 < acceleration_m_s2 < math.inf:
+            raise ValueError(
+                f"acceleration must be positive and finite, not {acceleration_m_s2} m/s²"
+            )
+        self._acceleration_m_s2 = acceleration_m_s2
 
     def _straight_on(
         self, here: Point, velocity: Point, target_enu_m: Point, speed_m_s: float

@@ -170,6 +170,10 @@ class WindyMotion:
         """Stay where the vehicle is, but for gusts."""
         self._still.stop(now_s)
 
+    def limit(self, acceleration_m_s2: float) -> None:
+        """As in still air."""
+        self._still.limit(acceleration_m_s2)
+
 
 def _effect(height_m: float) -> tuple[float, float]:
     """Share of the gusts at a height above ground, and its slope [1/m]."""

@@ -31,7 +31,9 @@ from swarm.protocol.board_arrays import (
 from swarm.protocol.calibration import (
     FlightRates,
     field_as_flown,
+    fleet_as_told,
     flight_rates,
+    told_by,
 )
 from swarm.protocol.encoding import FIELD_DEFAULTS
 from swarm.protocol.messages import MissionConfig, TaskEntry
@@ -118,7 +120,9 @@ class TaskBoard:
         self._mission: Mission | None = None
         self._mission_version = -1
         self._field_briefed: field.FieldProblem | None = None
-        """As the brief has its UAVs."""
+        """With its UAVs as the brief has them and as vehicles have told of their parameters."""
+        self._field_told: dict[str, tuple[float | None, float | None]] = {}
+        """What these had told then."""
         self._field_problem: field.FieldProblem | None = None
         self._field_version = -1
         self._field_rates: dict[str, FlightRates] = {}
@@ -136,6 +140,8 @@ class TaskBoard:
         self._arrays_version = -1, -1
         self._rates: dict[str, FlightRates] = {}
         self._rates_version = -1, -1
+        self._told: dict[str, tuple[float | None, float | None]] = {}
+        """What of that vehicles have told of their parameters."""
 
     @property
     def states(self) -> dict[str, TaskState]:
@@ -194,9 +200,10 @@ class TaskBoard:
     def field_problem(self) -> field.FieldProblem | None:
         """Of `mission`, each UAV as it flies, in its layer; None where `problem` tells all."""
         briefed, rates = self._field_briefed, self.rates
-        if self._field_version != self.replica.board_version:
+        if self._field_version != self.replica.board_version or self._field_told != self._told:
             briefed = self._field_briefed = self._field_problem_now()
             self._field_version, self._field_problem = self.replica.board_version, None
+            self._field_told = self._told
         if briefed is not None and (self._field_problem is None or self._field_rates != rates):
             self._field_problem, self._field_rates = field_as_flown(briefed, rates), rates
         return self._field_problem
@@ -207,6 +214,7 @@ class TaskBoard:
         version = self.replica.board_version, self.replica.calibration_version
         if self._rates_version != version:
             self._rates, self._rates_version = flight_rates(self.replica), version
+            self._told = told_by(self._rates)
         return self._rates
 
     def _field_problem_now(self) -> field.FieldProblem | None:
@@ -218,7 +226,9 @@ class TaskBoard:
             return None
         mission = self.mission
         layers_m = [uav.layer_m for uav in brief.uavs]
-        return None if mission is None else field.problem_of(mission, layers_m)
+        if mission is None:
+            return None
+        return field.problem_of(fleet_as_told(mission, self.rates), layers_m)
 
     def _fleet_now(self) -> Mission | None:
         """The mission without tasks and zones, made once per brief; None before the brief."""

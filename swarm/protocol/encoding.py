@@ -81,7 +81,7 @@ SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
     Outcome: frozenset({"reversed"}),
     Choice: frozenset({"base"}),
     ChoiceBasis: frozenset({"sortie_end_s", "landed_at", "parked", "blocking"}),
-    Calibration: frozenset({"land_s", "climb_s"}),
+    Calibration: frozenset({"land_s", "climb_s", "acceleration_m_s2", "speed_m_s"}),
 }
 """Fields that came with `FIELD_VERSION`; left out where they are as by default, so that a statement
 that has none of them is to the last byte what every release understands."""

@@ -17,6 +17,7 @@ from pydantic import Strict
 
 from swarm.protocol.fields import (
     MAX_COUNT,
+    Acceleration,
     Checked,
     Count,
     Duration,
@@ -28,6 +29,7 @@ from swarm.protocol.fields import (
     Probability,
     Reason,
     Score,
+    Speed,
     Words,
 )
 
@@ -222,9 +224,10 @@ class Outcome(Checked):
 
 @dataclass(frozen=True, slots=True)
 class Calibration(Checked):
-    """Register ``uav/<id>/calibration``: how this UAV flies, by what was measured in flight.
+    """Register ``uav/<id>/calibration``: how this UAV flies, by its parameters and in flight.
 
-    As multiples of what the brief says; see swarm.protocol.calibration.
+    What was measured is told as multiples of what brief and parameters say; see
+    swarm.protocol.calibration.
     """
 
     time_frac: Factor
@@ -237,6 +240,11 @@ class Calibration(Checked):
     """From above a base or its start, in its layer, until it has touched down [s]."""
     climb_s: Duration = 0.0
     """From a base back to its layer, at rest there [s]."""
+    acceleration_m_s2: Acceleration | None = None
+    """By its parameters: a leg from rest to rest takes length / speed + speed / this. None: it does
+    not say, or the brief does."""
+    speed_m_s: Speed | None = None
+    """It flies no faster by its parameters; None: not below what the brief says."""
 
 
 class StatusPhase(StrEnum):

@@ -13,6 +13,11 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from agent.vehicle.firmware.failsafes import ARDUCOPTER_NAMES, Failsafes, arducopter_failsafes
+from agent.vehicle.firmware.kinematics import (
+    ARDUCOPTER_LIMITS,
+    Kinematics,
+    arducopter_kinematics,
+)
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware, SpeedParameter
 from agent.vehicle.messages import (
     BatteryStatus,
@@ -87,6 +92,7 @@ class ArduCopter(Firmware):
     speed_parameters = (SpeedParameter("WP_SPD", 1.0), SpeedParameter("WPNAV_SPEED", 100.0))
     """WP_SPD [m/s] since 4.8, WPNAV_SPEED [cm/s] before."""
     failsafe_names = ARDUCOPTER_NAMES
+    limit_parameters = ARDUCOPTER_LIMITS
     streams = (
         (1, SystemStatus),
         (193, EkfStatus),
@@ -140,6 +146,10 @@ class ArduCopter(Firmware):
     def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
         """It listens to the heartbeats of certain system ids only."""
         return arducopter_failsafes(values, own_system_id)
+
+    def kinematics(self, values: Mapping[str, float]) -> Kinematics:
+        """As it flies to targets, in missions too."""
+        return arducopter_kinematics(values)
 
     def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
         """ArduCopter reads the height as above home."""

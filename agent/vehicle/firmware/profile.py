@@ -13,6 +13,7 @@ from typing import ClassVar
 
 from agent.vehicle.commands import result_text
 from agent.vehicle.firmware.failsafes import Failsafes
+from agent.vehicle.firmware.kinematics import Kinematics, LimitParameter
 from agent.vehicle.messages import (
     AltitudeFrame,
     CommandInt,
@@ -81,6 +82,8 @@ class Firmware(ABC):
     """The parameter without which legs take longer than they need to; None without one."""
     failsafe_names: ClassVar[tuple[tuple[str, ...], ...]]
     """Parameters that say what it does without us, each by all its names."""
+    limit_parameters: ClassVar[tuple[LimitParameter, ...]]
+    """Parameters that say how it flies its legs, under every name that they have had."""
     streams: ClassVar[tuple[tuple[int, type[Inbound]], ...]]
     """Message ids to ask for beside the position, and what each becomes."""
     mission_vehicle_items: ClassVar[int]
@@ -170,6 +173,10 @@ class Firmware(ABC):
     @abstractmethod
     def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
         """What the vehicle does without us, as far as these parameters say."""
+
+    @abstractmethod
+    def kinematics(self, values: Mapping[str, float]) -> Kinematics:
+        """How it flies its legs, as far as these parameters say."""
 
     # What it is told.
 

@@ -14,6 +14,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from agent.vehicle.firmware.failsafes import PX4_NAMES, Failsafes, px4_failsafes
+from agent.vehicle.firmware.kinematics import PX4_LIMITS, Kinematics, px4_kinematics
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware, Mode, SpeedParameter
 from agent.vehicle.messages import (
     CommandLong,
@@ -88,9 +89,9 @@ class Px4Copter(Firmware):
     """[m/s]; it also survives a restart of the vehicle."""
     override_spec = OverrideSpec(("MPC_JERK_AUTO",), 20.0)
     """[m/s³] PX4 brakes so early that the jerk, 4 by default, costs ever more time the nearer the
-    target is: speed is at most (√(b² + 8·a·d) - b)/2 at a distance d from it, with b = 4·a²/jerk
-    (computeMaxSpeedFromDistance of its TrajMath.hpp)."""
+    target is; agent.vehicle.firmware.kinematics has the formula."""
     failsafe_names = PX4_NAMES
+    limit_parameters = PX4_LIMITS
     streams = ((1, SystemStatus), (230, EkfStatus), (245, ExtendedState))
     """What comes too seldom unasked. EKF_STATUS_REPORT does not exist, and MISSION_CURRENT streams
     by itself: asked for either, PX4 answers "failed"."""
@@ -147,6 +148,10 @@ class Px4Copter(Firmware):
         """It listens to the heartbeats of every ground station, so ours are enough."""
         del own_system_id
         return px4_failsafes(values)
+
+    def kinematics(self, values: Mapping[str, float]) -> Kinematics:
+        """As it flies to targets and by missions."""
+        return px4_kinematics(values)
 
     def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
         """PX4 reads the height as above sea level; NaN is its own yaw and place."""

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from agent.vehicle.firmware.kinematics import arducopter_jerk_s
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, TextTemplate
 from sim.autopilot.firmware.model import (
@@ -29,6 +30,7 @@ from sim.autopilot.firmware.model import (
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.mission_run import MissionRunState
 from sim.autopilot.parameters import (
+    ENDLESS,
     ParameterBehaviour,
     ParameterEntry,
     ParameterRole,
@@ -134,6 +136,8 @@ _OLD_NAMES = {
     "WP_SPD_UP": ("WPNAV_SPEED_UP", _REAL, _CM),
     "WP_ACC": ("WPNAV_ACCEL", _REAL, _CM),
     "WP_JERK": ("WPNAV_JERK", _REAL, 1.0),
+    "PSC_JERK_NE": ("PSC_JERK_XY", _REAL, 1.0),
+    "ATC_ANGLE_MAX": ("ANGLE_MAX", _INT16, _CM),
     "WP_RADIUS_M": ("WPNAV_RADIUS", _REAL, _CM),
     "LAND_SPD_MS": ("LAND_SPEED", _INT16, _CM),
     "RTL_ALT_M": ("RTL_ALT", _INT32, _CM),
@@ -195,6 +199,7 @@ class ArduCopterModel(FirmwareModel):
     )
     fence_behaviour = FenceBehaviour("Vehicle breaching Polygon fence", tells_status=True)
     disarm_delay_after_landing = ParameterRole.DISARM_DELAY_S
+    jerk_cost_s = staticmethod(arducopter_jerk_s)
     disarms_at_once = frozenset({FlightMode.RTL, FlightMode.LAND})
 
     take_off_above_home = True
@@ -236,7 +241,7 @@ class ArduCopterModel(FirmwareModel):
             ParameterEntry(
                 "WP_SPD_UP", config.climb_m_s, _REAL, ParameterRole.CLIMB_M_S, least=0.1
             ),
-            ParameterEntry("WP_ACC", 2.5, _REAL, least=0.5),
+            self.acceleration_entry("WP_ACC", config.acceleration_m_s2, 0.5),
             ParameterEntry("WP_JERK", 1.0, _REAL, least=1.0),
             ParameterEntry("WP_ACC_CNR", 0.0, _REAL, least=0.0),
             ParameterEntry("WP_RADIUS_M", 2.0, _REAL, ParameterRole.CORNER_RADIUS_M, least=0.05),
@@ -250,6 +255,8 @@ class ArduCopterModel(FirmwareModel):
                 "RTL_LOIT_TIME", 5000.0, _INT32, ParameterRole.RETURN_WAIT_S, 1e-3, least=0.0
             ),
             ParameterEntry("GUID_TIMEOUT", 3.0, _REAL, least=0.1),
+            ParameterEntry("PSC_JERK_NE", ENDLESS, _REAL, ParameterRole.JERK_M_S3, least=1.0),
+            ParameterEntry("ATC_ANGLE_MAX", 80.0, _REAL, read_only=True),
             ParameterEntry("FS_GCS_ENABLE", 0.0, _INT8),
             ParameterEntry("FS_GCS_TIMEOUT", 5.0, _REAL, least=2.0),
             ParameterEntry("BATT_FS_LOW_ACT", 0.0, _INT8),

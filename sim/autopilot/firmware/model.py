@@ -9,10 +9,14 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import TYPE_CHECKING
 
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from agent.vehicle.firmware.kinematics import JerkCost
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.parameters import (
+    ENDLESS,
     ParameterBehaviour,
     ParameterEntry,
     ParameterRole,
@@ -197,6 +201,8 @@ class FirmwareModel(ABC):
     parameter_habits: ParameterBehaviour
     disarm_delay_after_landing: ParameterRole
     """What says how long after landing the motors stop..."""
+    jerk_cost_s: JerkCost
+    """What a limit of jerk costs a leg."""
     disarms_at_once: frozenset[FlightMode] = frozenset()
     """...but in modes in which they stop at once."""
 
@@ -253,6 +259,20 @@ class FirmwareModel(ABC):
     def disarm_delay(self, mode: FlightMode) -> ParameterRole | None:
         """What says how long after landing the motors stop; None where that is at once."""
         return None if mode in self.disarms_at_once else self.disarm_delay_after_landing
+
+    @staticmethod
+    def acceleration_entry(
+        name: str, acceleration_m_s2: float | None, least_m_s2: float
+    ) -> ParameterEntry:
+        """The parameter of an acceleration; one that speeds up in no time cannot be told to."""
+        return ParameterEntry(
+            name,
+            ENDLESS if acceleration_m_s2 is None else acceleration_m_s2,
+            mavlink.MAV_PARAM_TYPE_REAL32,
+            ParameterRole.ACCELERATION_M_S2,
+            least=least_m_s2,
+            read_only=acceleration_m_s2 is None,
+        )
 
     @abstractmethod
     def parameters(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:

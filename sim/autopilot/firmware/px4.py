@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from agent.vehicle.firmware.kinematics import px4_jerk_s
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
 from sim.autopilot.firmware.model import (
@@ -29,6 +30,7 @@ from sim.autopilot.firmware.model import (
 )
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.parameters import (
+    ENDLESS,
     ParameterBehaviour,
     ParameterEntry,
     ParameterRole,
@@ -177,6 +179,7 @@ class Px4Model(FirmwareModel):
         outside_fence=mavlink.MAV_RESULT_ACCEPTED,
     )
     disarm_delay_after_landing = ParameterRole.DISARM_LANDED_S
+    jerk_cost_s = staticmethod(px4_jerk_s)
     fence_behaviour = FenceBehaviour(
         "Geofence breached", inclusions_add=True, needs_home_inside=True, critical=True
     )
@@ -274,8 +277,8 @@ class Px4Model(FirmwareModel):
             ParameterEntry(
                 "MIS_TAKEOFF_ALT", 2.5, _REAL, ParameterRole.TAKE_OFF_HEIGHT_M, least=0.0
             ),
-            ParameterEntry("MPC_ACC_HOR", 3.0, _REAL, least=2.0),
-            ParameterEntry("MPC_JERK_AUTO", 4.0, _REAL, least=1.0),
+            self.acceleration_entry("MPC_ACC_HOR", config.acceleration_m_s2, 2.0),
+            ParameterEntry("MPC_JERK_AUTO", ENDLESS, _REAL, ParameterRole.JERK_M_S3, least=1.0),
             ParameterEntry(
                 "MPC_LAND_SPEED", config.land_m_s, _REAL, ParameterRole.LAND_M_S, least=0.6
             ),
@@ -285,9 +288,16 @@ class Px4Model(FirmwareModel):
             ParameterEntry(
                 "MPC_XY_CRUISE", config.cruise_m_s, _REAL, ParameterRole.CRUISE_M_S, least=0.1
             ),
+            ParameterEntry("MPC_TILTMAX_AIR", 89.0, _REAL, read_only=True),
             ParameterEntry("MPC_XY_ERR_MAX", 2.0, _REAL, least=0.1),
             ParameterEntry("MPC_XY_TRAJ_P", 0.5, _REAL, least=0.1),
-            ParameterEntry("MPC_XY_VEL_MAX", max(12.0, config.cruise_m_s), _REAL, least=0.0),
+            ParameterEntry(
+                "MPC_XY_VEL_MAX",
+                max(12.0, config.cruise_m_s),
+                _REAL,
+                ParameterRole.TOP_SPEED_M_S,
+                least=0.0,
+            ),
             ParameterEntry("MPC_Z_V_AUTO_UP", 3.0, _REAL, ParameterRole.CLIMB_M_S, least=0.1),
             ParameterEntry("NAV_ACC_RAD", 2.0, _REAL, ParameterRole.CORNER_RADIUS_M, least=0.05),
             ParameterEntry("NAV_DLL_ACT", 0.0, _INT32, least=0.0),

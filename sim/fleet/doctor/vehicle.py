@@ -15,7 +15,9 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.vehicle.codec import MavlinkCodec
 from agent.vehicle.firmware import firmware_of
+from agent.vehicle.firmware.kinematics import Kinematics
 from agent.vehicle.firmware.profile import Firmware
+from agent.vehicle.flight_limits import LimitsReading
 from agent.vehicle.framing import Framer
 from agent.vehicle.messages import (
     CommandLong,
@@ -47,6 +49,8 @@ _ASKED_FOR = (
 )
 """What a vehicle may not say unasked."""
 _SKEW_S = 1.0
+_SHOWN_M_S = 10.0
+"""Cruise speed at which legs are told of."""
 _BOOTING = "still booting or calibrating"
 _LOSSY, _DEAF = 0.02, 0.2
 """Shares of frames lost from which on a link is doubtful, and of no use."""
@@ -90,6 +94,7 @@ class VehicleListener:
         self._others: dict[int, int] = {}
         self._bytes = 0
         self._failsafes: FailsafeReading | None = None
+        self._limits: LimitsReading | None = None
 
     @property
     def heard(self) -> bool:
@@ -111,8 +116,9 @@ class VehicleListener:
             CommandLong(_CMD_REQUEST_MESSAGE, (float(each), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
             for each in _ASKED_FOR
         ]
-        unread = () if self._failsafes is None else self._failsafes.unread
-        asked += [ParameterRead(name) for name in unread]
+        readings = (self._failsafes, self._limits)
+        unread = (name for each in readings if each is not None for name in each.unread)
+        asked += map(ParameterRead, unread)
         return [self._codec.encode(each) for each in asked]
 
     @property
@@ -139,17 +145,19 @@ class VehicleListener:
                 self._state.on_position(heard.message)
             else:
                 self._state.on_message(heard.message, now_s)
-                self._read_failsafes(heard.message)
+                self._read_parameters(heard.message)
         for frame in self._codec.take_frames():
             for each in self._framer.feed(frame):
                 self._count(each.data)
                 self._take_time(each.message, unix_s)
 
-    def _read_failsafes(self, message: Inbound) -> None:
-        if self._failsafes is not None:
+    def _read_parameters(self, message: Inbound) -> None:
+        if self._failsafes is not None and self._limits is not None:
             self._failsafes.on_message(message)
+            self._limits.on_message(message)
         elif isinstance(message, Heartbeat) and (flavour := firmware_of(message)) is not None:
             self._failsafes = FailsafeReading(flavour, _AGENT_SYSTEM_ID)
+            self._limits = LimitsReading(flavour, flavour.override_spec)
 
     def _count(self, frame: bytes) -> None:
         number, component = (
@@ -184,6 +192,7 @@ class VehicleListener:
             self._vehicle(name, heartbeat, flavour),
             self._readiness(name, flavour),
             *([] if self._failsafes is None else [_failsafes(name, self._failsafes)]),
+            *([] if self._limits is None else [_limits(name, self._limits.kinematics)]),
             self._time(name),
             self._loss(name),
             self._signature(name),
@@ -292,6 +301,24 @@ def _failsafes(name: str, reading: FailsafeReading) -> CheckFinding:
     if told.battery is not None:
         return warns(what, f"{text}; {told.battery}", "set what it does of its own: return or land")
     return fine(what, text)
+
+
+def _limits(name: str, limits: Kinematics) -> CheckFinding:
+    """How it flies its legs."""
+    what = f"{name} legs"
+    if limits.absurd:
+        told = ", ".join(f"{each.name} {each.value:g}" for each in limits.absurd)
+        return warns(what, f"not believed: {told}", "set what the vehicle can fly")
+    parts = []
+    if limits.acceleration is not None:
+        acceleration, legs_m_s2 = limits.acceleration, limits.leg_acceleration_m_s2(_SHOWN_M_S)
+        parts.append(f"{acceleration.name} {acceleration.value:.3g} m/s²")
+        parts.append(f"with its jerk as long as {legs_m_s2:.3g} m/s² at {_SHOWN_M_S:g} m/s")
+    if limits.speed is not None:
+        parts.append(f"{limits.speed.name} {limits.speed.value:.3g} m/s")
+    if not parts:
+        return fine(what, "it tells no limit of acceleration or speed")
+    return fine(what, ", ".join(parts))
 
 
 def _advice(problem: str) -> str:
