@@ -17,6 +17,8 @@ from agent.vehicle.parameter_override import OverrideSpec
 from agent.vehicle.parameter_reading import PAUSE_TIMEOUTS, TRIES, ParameterReading
 from agent.vehicle.session import VehicleSession
 
+_TRIES_ARMED: Final = 4
+"""A vehicle that is about to take off has that many until what is known is told."""
 _WORTH_TELLING_FRAC: Final = 0.1
 """By so much a vehicle may be set otherwise than the mission says, before people are told."""
 
@@ -77,12 +79,12 @@ class LimitsCheck:
         """Take a parameter's value, or that there is none."""
         self._reading.on_message(message)
 
-    def ask(self) -> None:
-        """Read what is due, and tell it once all is known that will be."""
+    def ask(self, *, armed: bool) -> None:
+        """Read what is due, and tell it once all is known that will be before it flies."""
         session, names = self._session, self._reading.unread
         if self._told:
             return
-        if not names or self._tries >= TRIES:
+        if not names or self._tries >= (_TRIES_ARMED if armed else TRIES):
             self._told = True
             self._tell()
         elif session.now_s >= self._next_s:

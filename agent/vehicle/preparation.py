@@ -160,7 +160,6 @@ class _Preparation:
         if not firmware.has_booted(heartbeat):
             self.waiting_for = self._booting(heartbeat)
             return
-        self._limits.ask()
         self._consent.on_heartbeat(heartbeat)
         if self._mission is not None and self._mission_begun:
             self._follow_mission(self._mission, heartbeat)
@@ -187,6 +186,8 @@ class _Preparation:
             self._go_on_in_the_air(vehicle.position)
         else:
             self._session.say(*self._take_off(vehicle.position))
+        if not self.done and self.failure is None:
+            self._limits.ask(armed=heartbeat.armed)
 
     def _booting(self, heartbeat: Heartbeat) -> str:
         """Why it is not ready to be told anything.

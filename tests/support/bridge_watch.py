@@ -285,7 +285,8 @@ class BridgeWatch:
         hold(not self._silent, f"{name} after a hand-over: {message}")
         if name in ("PARAM_REQUEST_READ", "PARAM_SET"):
             hold(FlightPhase.PREPARING in phases, f"{name} while {before}, {after}")
-            read = self.fake.failsafe_names if name == "PARAM_REQUEST_READ" else frozenset()
+            readable = self.fake.failsafe_names | self.fake.limit_names
+            read = readable if name == "PARAM_REQUEST_READ" else frozenset()
             known = message.param_id in read or message.param_id in self.fake.speed_names
             hold(known, f"{name} of {message.param_id}")
         elif name in _MISSION_MESSAGES:

@@ -56,6 +56,13 @@ class FakeCopter:
         }
     )
     """What may be read of it besides."""
+    limit_names = frozenset(
+        {
+            *("WP_ACC", "WPNAV_ACCEL", "ATC_ANGLE_MAX", "ANGLE_MAX"),
+            *("PSC_JERK_NE", "PSC_NE_JERK", "PSC_JERK_XY"),
+        }
+    )
+    """What may be read of it to know how it flies its legs."""
     jerk_names: tuple[str, ...] = ("WP_JERK", "WPNAV_JERK")
     """Names that the parameter of the greatest jerk may have."""
 
@@ -98,6 +105,9 @@ class FakeCopter:
         self.parameters: dict[str, float] = {
             "WP_SPD": default_speed_m_s,
             "WP_JERK": 1.0,
+            "WP_ACC": 2.5,
+            "PSC_JERK_NE": 5.0,
+            "ATC_ANGLE_MAX": 30.0,
             "FS_GCS_ENABLE": 1.0,
             "FS_GCS_TIMEOUT": 5.0,
             "MAV_GCS_SYSID": 255.0,

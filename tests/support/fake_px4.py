@@ -53,6 +53,7 @@ class FakePx4(FakeCopter):
     failsafe_names = frozenset(
         {"NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_DL_LOSS_T", "COM_LOW_BAT_ACT", "SWARM_SIMULATED"}
     )
+    limit_names = frozenset({"MPC_ACC_HOR", "MPC_JERK_AUTO", "MPC_TILTMAX_AIR", "MPC_XY_VEL_MAX"})
     jerk_names = ("MPC_JERK_AUTO",)
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -64,6 +65,9 @@ class FakePx4(FakeCopter):
         self.parameters = {
             "MPC_XY_CRUISE": self.default_speed_m_s,
             "MPC_JERK_AUTO": 4.0,
+            "MPC_ACC_HOR": 3.0,
+            "MPC_TILTMAX_AIR": 45.0,
+            "MPC_XY_VEL_MAX": 12.0,
             "NAV_DLL_ACT": 2.0,
             "COM_DLL_EXCEPT": 0.0,
             "COM_DL_LOSS_T": 30.0,

@@ -8,6 +8,7 @@ import math
 import pytest
 
 from agent.core.interface import (
+    FlightLimits,
     HandedOver,
     Home,
     NotReady,
@@ -72,7 +73,7 @@ def test_vehicle_whose_position_comes_late_takes_off_as_any_other(
     assert not flight.copter.commands(ARM)
     flight.run_until(VehicleReady())
     assert math.dist(flight.copter.position_m, START.position_enu_m) < 1.0
-    assert {type(report) for report in flight.reports} == {NotReady, VehicleReady}
+    assert {type(report) for report in flight.reports} == {NotReady, FlightLimits, VehicleReady}
 
 
 @pytest.mark.parametrize("met_s", [1.0, 30.0])
@@ -266,7 +267,8 @@ def test_speed_goes_by_parameter_if_the_command_is_refused(fake: type[FakeCopter
 
     assert copter.parameters[name] == (400.0 if name == "WPNAV_SPEED" else 4.0)
     asked = {m.param_id for m in copter.heard if m.get_type() == "PARAM_REQUEST_READ"}
-    assert asked - fake.failsafe_names - set(fake.jerk_names) == set(fake.speed_names)
+    others = fake.failsafe_names | fake.limit_names | set(fake.jerk_names)
+    assert asked - others == set(fake.speed_names)
 
 
 def test_speed_that_cannot_be_set_at_all_is_said(fake: type[FakeCopter]) -> None:
