@@ -249,7 +249,14 @@ task_orders = _of_tasks(TaskEdit)
 starts = st.builds(StartWithout, uav_ids, counts, notes)
 zone_edits = st.builds(ZoneEdit, zones, st.booleans(), counts, notes)
 readies = st.builds(UavReady, uav_ids, counts, notes)
-calibrations = st.builds(Calibration, st.floats(1e-3, 1e3), st.floats(1e-3, 1e3), counts)
+calibrations = st.builds(
+    Calibration,
+    st.floats(1e-3, 1e3),
+    st.floats(1e-3, 1e3),
+    counts,
+    acceleration_m_s2=st.none() | st.floats(1e-6, 1e6),
+    speed_m_s=st.none() | st.floats(1e-6, 1e6),
+)
 by_coordinator = briefs | epochs | boards
 by_uav = claims | outcomes | calibrations | statuses | choices
 by_operator = commands | task_orders | starts | zone_edits | readies

@@ -7,7 +7,7 @@ A leg from rest to rest takes d/v + v/a at best. What a limit of jerk j costs be
   nothing until it is as slow as at an arrival.
 - PX4 speeds up likewise, and brakes such that v² + b·v = 2·a·d with b = 4·a²/j
   (`computeMaxSpeedFromDistance` of its TrajMath.hpp): integrated down to the speed u of an arrival,
-  (2·a/j)·(ln(v/u) − 1) longer than v/2a.
+  (2·a/j)·(ln(v/u) − 1) longer than with a all along.
 
 Both are told as the acceleration with which v/a alone takes as long: short legs, on which v is
 never reached, differ from that by a tenth of a second.

@@ -207,6 +207,44 @@ def test_the_first_plan_reckons_with_what_vehicles_tell_of_landing_and_climbing(
     assert replans(coordinator) == [], "the plan knows it already"
 
 
+def test_the_first_plan_counts_on_the_acceleration_that_vehicles_tell() -> None:
+    battery = replace(U0, endurance_s=300.0)
+    coordinator = LoneCoordinator(mission([battery, U1], [task("t0", 50.0)]))
+    coordinator.answer_plan("u0", "u1")
+    limits = Calibration(1.0, 1.0, 0, acceleration_m_s2=2.0, speed_m_s=0.5 * U0.speed_m_s)
+    coordinator.hear("u0", limits)
+    first, wanted = plans_wanted(coordinator.log)
+    flown = {uav.id: (uav.speed_m_s, uav.acceleration_m_s2) for uav in wanted.mission.uavs}
+    assert [uav.acceleration_m_s2 for uav in first.mission.uavs] == [None, None]
+    assert flown == {"u0": (0.5 * U0.speed_m_s, 2.0), "u1": (U1.speed_m_s, None)}
+
+    coordinator.answer_plan("u1", "u0")
+    coordinator.ready("u0", "u1")
+    assert coordinator.phase is MissionPhase.RUNNING
+    coordinator.run_until(120.0)
+    assert replans(coordinator) == [], "the plan knows it already"
+
+
+def test_the_scenarios_acceleration_goes_before_the_vehicles() -> None:
+    briefed = replace(U0, acceleration_m_s2=3.0)
+    coordinator = LoneCoordinator(mission([briefed, U1], [task("t0", 50.0)]))
+    coordinator.answer_plan("u0", "u1")
+    coordinator.hear("u0", Calibration(1.0, 1.0, 0, acceleration_m_s2=1.0))
+    assert len(plans_wanted(coordinator.log)) == 1
+    coordinator.hear("u1", Calibration(1.0, 1.0, 0, acceleration_m_s2=1.0))
+    *_, wanted = plans_wanted(coordinator.log)
+    assert [uav.acceleration_m_s2 for uav in wanted.mission.uavs] == [3.0, 1.0]
+
+
+def test_a_plan_without_the_fields_keys_stays_as_it_was_whatever_vehicles_tell() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [task("t0", 50.0)]))
+    coordinator.answer_plan("u0", "u1")
+    coordinator.hear("u0", Calibration(1.0, 1.0, 0, acceleration_m_s2=1.0, speed_m_s=0.1))
+    coordinator.ready("u0", "u1")
+    assert len(plans_wanted(coordinator.log)) == 1
+    assert coordinator.phase is MissionPhase.RUNNING
+
+
 def test_a_plan_without_constraints_is_of_the_schema_of_the_file() -> None:
     """It tells a schedule, also while what asks for one has not appeared."""
     window = replace(task("t1", 50.0), appears_s=30.0, closes_s=90.0)

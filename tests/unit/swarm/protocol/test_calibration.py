@@ -11,7 +11,7 @@ from swarm.allocation.field.ways import way_to
 from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskBoard
-from swarm.protocol.calibration import FlightRates, flight_rates
+from swarm.protocol.calibration import FlightRates, flight_rates, noticeably_otherwise
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.messages import Body
@@ -119,6 +119,115 @@ def test_who_takes_no_time_to_land_says_what_every_release_understands() -> None
     plain = encode(message("u0", Calibration(1.2, 1.1, 5)))
     assert b"land_s" not in plain
     assert len(plain) < len(encode(message("u0", Calibration(1.2, 1.1, 5, 20.0, 7.0))))
+
+
+def test_who_tells_nothing_of_its_parameters_says_what_it_said_before() -> None:
+    upright = Calibration(1.2, 1.1, 5, 20.0, 7.0)
+    without = encode(message("u0", upright))
+    told = encode(message("u0", replace(upright, acceleration_m_s2=2.5, speed_m_s=12.0)))
+    for name in (b"acceleration_m_s2", b"speed_m_s"):
+        assert name not in without
+        assert name in told
+    codec = Codec(MISSION)
+    heard = codec.decode(message("u0", upright).key, told)
+    assert heard is not None
+    assert heard.body == replace(upright, acceleration_m_s2=2.5, speed_m_s=12.0)
+
+
+# -- what vehicles tell of their parameters -----------------------------------------------
+
+WITHOUT = replace(
+    IN_FIELD, uavs=tuple(replace(uav, acceleration_m_s2=None) for uav in IN_FIELD.uavs)
+)
+"""The brief says nothing of accelerations, and counts on batteries."""
+
+
+def limited(acceleration_m_s2: float | None = None, speed_m_s: float | None = None) -> Calibration:
+    return Calibration(1.0, 1.0, 0, 0.0, 0.0, acceleration_m_s2, speed_m_s)
+
+
+def test_legs_are_those_of_a_mission_that_says_what_the_vehicle_told() -> None:
+    told = Board(WITHOUT)
+    before = told.board.field_problem
+    told.say("u1", limited(1.5, 8.0))
+    slow = replace(WITHOUT.uavs[1], acceleration_m_s2=1.5, speed_m_s=8.0)
+    briefed = Board(replace(WITHOUT, uavs=(WITHOUT.uavs[0], slow)))
+
+    after, same = told.board.field_problem, briefed.board.field_problem
+    assert before is not None
+    assert after is not None
+    assert same is not None
+    assert told.board.field_problem is after
+    for uav in (0, 1):
+        np.testing.assert_array_equal(after.leg_s[after.kind[uav]], same.leg_s[same.kind[uav]])
+        np.testing.assert_array_equal(after.home_s[uav], same.home_s[uav])
+        here = after.legs_from_s(uav, (3.0, 4.0, 0.0))
+        np.testing.assert_array_equal(here, same.legs_from_s(uav, (3.0, 4.0, 0.0)))
+    np.testing.assert_array_equal(after.leg_s[after.kind[0]], before.leg_s[before.kind[0]])
+    np.testing.assert_array_equal(after.full_s, before.full_s)
+
+
+def test_what_was_measured_is_a_multiple_of_what_the_vehicle_told() -> None:
+    told, slow = Board(WITHOUT), Board(WITHOUT)
+    told.say("u1", limited(1.5))
+    slow.say("u1", replace(limited(1.5), time_frac=1.25))
+    before, after = told.board.field_problem, slow.board.field_problem
+    assert before is not None
+    assert after is not None
+    np.testing.assert_array_equal(after.leg_s[after.kind[1]], before.leg_s[before.kind[1]] * 1.25)
+
+
+def test_plain_legs_with_acceleration_follow_too() -> None:
+    one_says = replace(FLIGHT, uavs=(FLIGHT.uavs[0], replace(PLAIN.uavs[1])))
+    told, briefed = Board(one_says), Board(FLIGHT)
+    told.say("u1", limited(2.0))
+    after, same = told.board.problem, briefed.board.problem
+    assert told.board.field_problem is None
+    assert after is not None
+    assert same is not None
+    np.testing.assert_array_equal(after.travel_s(1, np.zeros(3)), same.travel_s(1, np.zeros(3)))
+
+
+def test_the_scenario_goes_before_the_vehicle() -> None:
+    told, fresh = Board(IN_FIELD), Board(IN_FIELD)
+    told.say("u1", limited(0.5, 12.0))  # it could fly faster than it is told to
+    assert flight_rates(told.replica) == {}
+    after, same = told.board.field_problem, fresh.board.field_problem
+    assert after is not None
+    assert same is not None
+    np.testing.assert_array_equal(after.leg_s, same.leg_s)
+
+
+def test_parameters_that_nobody_would_believe_are_clamped() -> None:
+    told = Board(WITHOUT)
+    told.say("u0", limited(1e-6, 1e-6))
+    told.say("u1", limited(1e6))
+    rates = flight_rates(told.replica)
+    assert (rates["u0"].acceleration_m_s2, rates["u0"].speed_m_s) == (0.1, 1.0)
+    assert rates["u1"].acceleration_m_s2 == 50.0
+
+
+def test_without_the_keys_of_the_field_parameters_do_not_count() -> None:
+    told = Board(PLAIN)
+    before = told.board.problem
+    told.say("u0", limited(1.5, 8.0))
+    after = told.board.problem
+    assert flight_rates(told.replica) == {}
+    assert before is not None
+    assert after is not None
+    np.testing.assert_array_equal(after.travel_between_s(0), before.travel_between_s(0))
+
+
+def test_plans_are_made_anew_for_another_acceleration_or_speed() -> None:
+    known = {"u0": FlightRates(acceleration_m_s2=2.0, speed_m_s=8.0)}
+    for now, anew in (
+        (FlightRates(acceleration_m_s2=2.05, speed_m_s=8.1), []),
+        (FlightRates(acceleration_m_s2=1.5, speed_m_s=8.0), ["u0"]),
+        (FlightRates(acceleration_m_s2=2.0, speed_m_s=7.0), ["u0"]),
+        (FlightRates(acceleration_m_s2=2.0), ["u0"]),
+    ):
+        assert noticeably_otherwise(known, {"u0": now}) == anew
+    assert noticeably_otherwise({}, known) == ["u0"]
 
 
 @pytest.mark.parametrize("mission", [FLIGHT, IN_FIELD])
