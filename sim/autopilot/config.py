@@ -136,6 +136,8 @@ class VehicleConfig:
     """Time without GPS after which the firmware lands the vehicle [s]; None: it hovers."""
     acceleration_m_s2: float | None = None
     """Greatest acceleration [m/s²]; None: speeds change in no time."""
+    jerk_m_s3: float | None = None
+    """Greatest jerk [m/s³]; None: accelerations change in no time."""
     rounds_corners: bool = False
     """Passes waypoints without a stop and turns as recorded ones do; only with an acceleration."""
     airspeed_limit_m_s: float | None = None
@@ -157,6 +159,7 @@ class VehicleConfig:
             "endurance_s",
             "position_failsafe_s",
             "acceleration_m_s2",
+            "jerk_m_s3",
             "airspeed_limit_m_s",
         ):
             value = getattr(self, name)

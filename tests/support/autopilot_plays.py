@@ -431,7 +431,12 @@ PLAYS = {
         {**ARDUCOPTER, **TURNS},
     ),
     "PX4's corners": Play(
-        "px4-1.17-corners.jsonl", 3.0, Px4Model(), PX4_BOOTS, 487.8, {**PX4_FLIGHT, **TURNS}
+        "px4-1.17-corners.jsonl",
+        3.0,
+        Px4Model(),
+        PX4_BOOTS,
+        487.8,
+        {**PX4_FLIGHT, **TURNS, "acceleration_m_s2": 3.0, "jerk_m_s3": 4.0},
     ),
     "ArduCopter without its ground station": Play(
         "arducopter-4.8-ground-lost.jsonl", 4.0, ArduCopterModel(), COPTER_BOOTS, 488.1, ARDUCOPTER

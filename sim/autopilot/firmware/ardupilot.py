@@ -30,7 +30,6 @@ from sim.autopilot.firmware.model import (
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.mission_run import MissionRunState
 from sim.autopilot.parameters import (
-    ENDLESS,
     ParameterBehaviour,
     ParameterEntry,
     ParameterRole,
@@ -255,7 +254,7 @@ class ArduCopterModel(FirmwareModel):
                 "RTL_LOIT_TIME", 5000.0, _INT32, ParameterRole.RETURN_WAIT_S, 1e-3, least=0.0
             ),
             ParameterEntry("GUID_TIMEOUT", 3.0, _REAL, least=0.1),
-            ParameterEntry("PSC_JERK_NE", ENDLESS, _REAL, ParameterRole.JERK_M_S3, least=1.0),
+            self.jerk_entry("PSC_JERK_NE", config.jerk_m_s3),
             ParameterEntry("ATC_ANGLE_MAX", 80.0, _REAL, read_only=True),
             ParameterEntry("FS_GCS_ENABLE", 0.0, _INT8),
             ParameterEntry("FS_GCS_TIMEOUT", 5.0, _REAL, least=2.0),

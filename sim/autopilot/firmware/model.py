@@ -274,6 +274,17 @@ class FirmwareModel(ABC):
             read_only=acceleration_m_s2 is None,
         )
 
+    @staticmethod
+    def jerk_entry(name: str, jerk_m_s3: float | None) -> ParameterEntry:
+        """The parameter of a jerk."""
+        return ParameterEntry(
+            name,
+            ENDLESS if jerk_m_s3 is None else jerk_m_s3,
+            mavlink.MAV_PARAM_TYPE_REAL32,
+            ParameterRole.JERK_M_S3,
+            least=1.0,
+        )
+
     @abstractmethod
     def parameters(self, config: VehicleConfig) -> tuple[ParameterEntry, ...]:
         """The parameter table at power-up; it has every `ParameterRole` that has no default."""

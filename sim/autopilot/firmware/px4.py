@@ -30,7 +30,6 @@ from sim.autopilot.firmware.model import (
 )
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.parameters import (
-    ENDLESS,
     ParameterBehaviour,
     ParameterEntry,
     ParameterRole,
@@ -278,7 +277,7 @@ class Px4Model(FirmwareModel):
                 "MIS_TAKEOFF_ALT", 2.5, _REAL, ParameterRole.TAKE_OFF_HEIGHT_M, least=0.0
             ),
             self.acceleration_entry("MPC_ACC_HOR", config.acceleration_m_s2, 2.0),
-            ParameterEntry("MPC_JERK_AUTO", ENDLESS, _REAL, ParameterRole.JERK_M_S3, least=1.0),
+            self.jerk_entry("MPC_JERK_AUTO", config.jerk_m_s3),
             ParameterEntry(
                 "MPC_LAND_SPEED", config.land_m_s, _REAL, ParameterRole.LAND_M_S, least=0.6
             ),

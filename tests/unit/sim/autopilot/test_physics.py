@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from agent.vehicle.firmware.kinematics import arducopter_kinematics, px4_kinematics
 from sim.autopilot.config import BatteryFailsafe, Physics, VehicleConfig, fleet_of
 from sim.autopilot.faults import FaultKind, VehicleFault
+from sim.autopilot.firmware.ardupilot import ArduCopterModel
+from sim.autopilot.firmware.px4 import Px4Model
 from sim.autopilot.options import check_wind, faults_by_uav, parse_wind, require_finite
 from sim.world.wind import Wind, gusts_of
 from swarm.model import UavId
@@ -162,3 +165,60 @@ def test_every_wrong_fault_is_told() -> None:
     lines = [str(fault) for fault in caught.value.faults]
     assert lines[0].startswith("--fault: uav1:silent: no fault; write UAV:KIND@T")
     assert lines[1].startswith("--fault: uav9:stuck@1: no UAV 'uav9'; did you mean 'uav1'? ")
+
+
+# -- limits that are parameters -----------------------------------------------------------
+
+NAMES = {
+    "new": (ArduCopterModel(), "WP_ACC", 1.0, "PSC_JERK_NE"),
+    "old": (ArduCopterModel(old_names=True), "WPNAV_ACCEL", 100.0, "PSC_JERK_XY"),
+    "px4": (Px4Model(), "MPC_ACC_HOR", 1.0, "MPC_JERK_AUTO"),
+}
+"""Flavour, its acceleration with the unit, and its jerk."""
+
+
+def leg_s(ground: GroundStation) -> float:
+    """How long it flies to a place 80 m away, from rest to rest at 8 m/s."""
+    motion = ground.vehicle.pilot.flight.motion
+    ground.vehicle.pilot.flight.navigate((80.0, 0.0, 0.0), 100.0, 8.0)
+    assert motion.arrives_s is not None
+    return motion.arrives_s - 100.0
+
+
+@pytest.mark.parametrize("which", NAMES)
+def test_acceleration_and_jerk_are_those_of_the_parameters(which: str) -> None:
+    flavour, acceleration, unit, jerk = NAMES[which]
+    as_made, slower, smoother = (ground_station(flavour, acceleration_m_s2=2.5) for _ in range(3))
+    assert as_made.vehicle.pilot.parameters.value(acceleration) == 2.5 * unit
+    assert leg_s(as_made) == pytest.approx(80.0 / 8.0 + 8.0 / 2.5)
+
+    set_real(slower, acceleration, 2.0 * unit)
+    assert leg_s(slower) == pytest.approx(80.0 / 8.0 + 8.0 / 2.0)
+
+    set_real(smoother, jerk, 10.0)
+    costs_s = flavour.jerk_cost_s(8.0, 2.5, 10.0)
+    assert costs_s > 0.05
+    assert leg_s(smoother) == pytest.approx(80.0 / 8.0 + 8.0 / 2.5 + costs_s)
+
+
+@pytest.mark.parametrize("which", NAMES)
+def test_a_vehicle_whose_speed_changes_at_once_says_so_and_keeps_it(which: str) -> None:
+    flavour, acceleration, unit, _ = NAMES[which]
+    ground = ground_station(flavour)
+    set_real(ground, acceleration, 2.0 * unit)
+    values = {each.name: each.value for each in ground.vehicle.pilot.parameters}
+    told = (px4_kinematics if which == "px4" else arducopter_kinematics)(values)
+    assert told.acceleration is None
+    assert told.absurd == ()
+    assert leg_s(ground) == pytest.approx(10.0)
+
+
+def test_px4_flies_no_faster_than_its_greatest_speed() -> None:
+    ground = ground_station(Px4Model(), acceleration_m_s2=4.0)
+    set_real(ground, "MPC_XY_VEL_MAX", 4.0)
+    assert leg_s(ground) == pytest.approx(80.0 / 4.0 + 4.0 / 4.0)
+
+
+def set_real(ground: GroundStation, name: str, value: float) -> None:
+    kind = mavlink.MAV_PARAM_TYPE_REAL32
+    ground.send(mavlink.MAVLink_param_set_message(1, 1, name.encode(), value, kind))

@@ -59,6 +59,15 @@ def test_a_leg_lasts_from_departure_to_arrival() -> None:
     assert legs[0].planned_s == pytest.approx(legs[0].length_m / 8.0)
 
 
+def test_planned_is_what_the_vehicles_said_of_their_acceleration_where_the_scenario_does_not() -> (
+    None
+):
+    told = {**FLOWN, "calibration": {"uav1": {"time_frac": 1.1, "acceleration_m_s2": 2.0}}}
+    first, _, other = legs_flown(MEADOW, told, "flight.json")
+    assert first.planned_s == pytest.approx(first.length_m / 8.0 + 8.0 / 2.0)
+    assert other.planned_s == pytest.approx(other.length_m / 8.0)
+
+
 def test_medians_are_told_with_their_spread_and_beyond_the_ramps() -> None:
     legs = legs_flown(MEADOW, FLOWN, "flight.json")
     times = leg_times(legs, 2.0)

@@ -9,6 +9,7 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.vehicle.config import SerialAddress, UdpInAddress
+from agent.vehicle.firmware.ardupilot import ArduCopter
 from agent.vehicle.signing import Signing, SigningKey
 from sim.fleet.doctor.finding import CheckFinding, CheckState
 from sim.fleet.doctor.link import VehicleAddress, parse_vehicle
@@ -137,7 +138,32 @@ def test_parameters_are_asked_for_until_they_are_told() -> None:
 
     assert before == set()
     assert {"FS_GCS_ENABLE", "SYSID_MYGCS", "MAV_GCS_SYSID", "BATT_FS_LOW_ACT"} <= first
+    limits = {each.name for each in ArduCopter.limit_parameters}
+    assert limits <= first
+    assert asked_for(listening) == {"MAV_GCS_SYSID_HI", "FS_GCS_TIMEOUT"} | limits
+    said = Speaker().say(*parameters(WPNAV_ACCEL=100, PSC_JERK_XY=5, ANGLE_MAX=3000)).said
+    listening.receive(bytes(said), 3.0, UNIX_S)
     assert asked_for(listening) == {"MAV_GCS_SYSID_HI", "FS_GCS_TIMEOUT"}
+
+
+def test_how_it_flies_its_legs_is_told() -> None:
+    ready = Speaker().say(heartbeat())
+    nothing = found(ready)[f"{NAME} legs"]
+    slow = found(Speaker().say(heartbeat(), *parameters(WPNAV_ACCEL=100, PSC_JERK_XY=5)))
+    px4 = Speaker().say(heartbeat(autopilot=12))
+    for name, value in (("MPC_ACC_HOR", 3.0), ("MPC_JERK_AUTO", 4.0), ("MPC_XY_VEL_MAX", 12.0)):
+        kind = mavlink.MAV_PARAM_TYPE_REAL32
+        px4.say(mavlink.MAVLink_param_value_message(name.encode(), value, kind, 3, 65535))
+    absurd = found(Speaker().say(heartbeat(), *parameters(WP_ACC=-3)))[f"{NAME} legs"]
+
+    assert nothing.text == "it tells no limit of acceleration or speed"
+    assert slow[f"{NAME} legs"].text == (
+        "WPNAV_ACCEL 1 m/s², with its jerk as long as 0.99 m/s² at 10 m/s"
+    )
+    assert found(px4)[f"{NAME} legs"].text == (
+        "MPC_ACC_HOR 3 m/s², with its jerk as long as 2.5 m/s² at 10 m/s, MPC_XY_VEL_MAX 12 m/s"
+    )
+    assert (absurd.state, absurd.text) == (CheckState.WARNING, "not believed: WP_ACC -3")
 
 
 def test_what_keeps_it_from_flying_is_told_in_the_bridges_words() -> None:
