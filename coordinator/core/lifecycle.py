@@ -16,12 +16,7 @@ from coordinator.planner.online import EpochPolicy, ReplanResult, Situation
 from swarm.model import Mission, Plan, Uav, UavId
 from swarm.model.layers import FlightLayers
 from swarm.protocol.board import TaskBoard, TaskState, anything_doable, is_of_field, mission_of
-from swarm.protocol.calibration import (
-    FlightRates,
-    fleet_as_told,
-    flight_rates,
-    noticeably_otherwise,
-)
+from swarm.protocol.calibration import FlightRates, flight_rates, noticeably_otherwise
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
 from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.membership import Membership
@@ -57,8 +52,7 @@ class MakePlan:
     method: str
     seed: int
     rates: Mapping[str, FlightRates] = field(default_factory=dict)
-    """UAVs of which it is known that they fly otherwise than the brief says, and how; what is known
-    by their parameters, ``mission`` says already."""
+    """UAVs of which it is known that they fly otherwise than the mission says, and how."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -302,8 +296,7 @@ class StartGate:
         brief = self._replica.brief
         if brief is None:
             return []
-        briefed = mission_of(self._replica, self._mission.name, brief)
-        mission = fleet_as_told(briefed, self.rates)
+        mission = mission_of(self._replica, self._mission.name, brief)
         fleet = tuple(uav for uav in mission.uavs if uav.id in uavs)
         if is_of_field(mission):
             fleet = _in_layers(fleet, brief)

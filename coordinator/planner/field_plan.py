@@ -116,17 +116,17 @@ def make_field_plan(asked: FieldRequest) -> Plan:
 
 
 def _problem_of(mission: Mission, rates: Mapping[str, FlightRates]) -> FieldProblem:
+    known = mission.known_at_start()
     try:
-        problem = FieldProblem.from_mission(mission.known_at_start())
+        if not rates:
+            return FieldProblem.from_mission(known)
+        # Planning on the desk loads no registers.
+        from swarm.protocol.calibration import field_as_flown, field_as_told
+
+        return field_as_flown(field_as_told(known, rates, FieldProblem.from_mission), rates)
     except TooManyLegsError as error:
         remedy = "fly fewer tasks at a time, or UAVs that are alike"
         raise InputError(Fault(f"mission {mission.name}", "", str(error), remedy)) from error
-    if not rates:
-        return problem
-    # Planning on the desk loads no registers.
-    from swarm.protocol.calibration import field_as_flown
-
-    return field_as_flown(problem, rates)
 
 
 def _field_method(asked: FieldRequest) -> str:

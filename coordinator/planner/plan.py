@@ -189,7 +189,8 @@ def make_plan(
         bound_frac: share of a limit that is kept for that bound, within 0..1.
         threads: at most this many, of processors if None; changes nothing but speed.
         modest: search little for a sequence; costs 0.1 % of J at 10 × 50, saves most of the time.
-        rates: how UAVs fly, where that is known to be otherwise than a mission in the field says.
+        rates: how UAVs fly, where that is known to be otherwise than the mission says; outside of
+            the field their accelerations and speeds alone.
         bound_progress: told each lower bound when it is found [value·s].
 
     Returns:
@@ -210,6 +211,10 @@ def make_plan(
         asked = (stop, progress, bound_s, bound_frac, threads, modest, rates or {}, bound_progress)
         return make_field_plan(FieldRequest(mission, method, clock, seed, *asked))
     begin_s = clock.now_s()
+    if rates:
+        from swarm.protocol.calibration import fleet_as_told  # no registers on the desk
+
+        mission = fleet_as_told(mission, rates)
     problem = Problem.from_mission(mission.known_at_start())
     ends = never if stop is None else stop
     search = _PlanRequest(problem, method, seed, stop, progress, threads, modest, bound_progress)

@@ -31,7 +31,7 @@ from swarm.protocol.board_arrays import (
 from swarm.protocol.calibration import (
     FlightRates,
     field_as_flown,
-    fleet_as_told,
+    field_as_told,
     flight_rates,
     told_by,
 )
@@ -228,7 +228,7 @@ class TaskBoard:
         layers_m = [uav.layer_m for uav in brief.uavs]
         if mission is None:
             return None
-        return field.problem_of(fleet_as_told(mission, self.rates), layers_m)
+        return field_as_told(mission, self.rates, lambda told: field.problem_of(told, layers_m))
 
     def _fleet_now(self) -> Mission | None:
         """The mission without tasks and zones, made once per brief; None before the brief."""

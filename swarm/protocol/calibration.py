@@ -18,7 +18,7 @@ clamped to what is believable, and changes predictions about itself only. Leaves
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -157,6 +157,27 @@ def fleet_as_told(fleet: Mission, rates: Mapping[str, FlightRates]) -> Mission:
     return replace(fleet, uavs=uavs)
 
 
+def field_as_told(
+    mission: Mission,
+    rates: Mapping[str, FlightRates],
+    make: Callable[[Mission], field.FieldProblem],
+) -> field.FieldProblem:
+    """What ``make`` makes of ``mission`` with what vehicles have told of their parameters.
+
+    Where UAVs that fly alike no longer do, and tables of legs would get too large by it, it is made
+    of the mission as it is.
+    """
+    told = fleet_as_told(mission, rates)
+    if told is not mission:
+        from swarm.allocation.field.network import TooManyLegsError  # plain missions start sooner
+
+        try:
+            return make(told)
+        except TooManyLegsError:
+            pass
+    return make(mission)
+
+
 def fleet_as_flown(fleet: Mission, rates: Mapping[str, FlightRates]) -> Mission:
     """``fleet`` with the speeds that UAVs really have; the same one where all fly as briefed."""
     fleet = fleet_as_told(fleet, rates)
@@ -169,7 +190,7 @@ def fleet_as_flown(fleet: Mission, rates: Mapping[str, FlightRates]) -> Mission:
 def field_as_flown(
     problem: field.FieldProblem, rates: Mapping[str, FlightRates]
 ) -> field.FieldProblem:
-    """``problem``, of the fleet `fleet_as_told`, as UAVs really fly and drain their batteries.
+    """``problem``, made by `field_as_told`, as UAVs really fly and drain their batteries.
 
     The same one where nobody has measured anything. Who has to climb has used up some charge at
     mission time 0, when the last one is in the air.

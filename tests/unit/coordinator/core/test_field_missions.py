@@ -214,9 +214,8 @@ def test_the_first_plan_counts_on_the_acceleration_that_vehicles_tell() -> None:
     limits = Calibration(1.0, 1.0, 0, acceleration_m_s2=2.0, speed_m_s=0.5 * U0.speed_m_s)
     coordinator.hear("u0", limits)
     first, wanted = plans_wanted(coordinator.log)
-    flown = {uav.id: (uav.speed_m_s, uav.acceleration_m_s2) for uav in wanted.mission.uavs}
-    assert [uav.acceleration_m_s2 for uav in first.mission.uavs] == [None, None]
-    assert flown == {"u0": (0.5 * U0.speed_m_s, 2.0), "u1": (U1.speed_m_s, None)}
+    assert first.rates == {}
+    assert wanted.rates == {"u0": FlightRates(acceleration_m_s2=2.0, speed_m_s=0.5 * U0.speed_m_s)}
 
     coordinator.answer_plan("u1", "u0")
     coordinator.ready("u0", "u1")
@@ -233,7 +232,7 @@ def test_the_scenarios_acceleration_goes_before_the_vehicles() -> None:
     assert len(plans_wanted(coordinator.log)) == 1
     coordinator.hear("u1", Calibration(1.0, 1.0, 0, acceleration_m_s2=1.0))
     *_, wanted = plans_wanted(coordinator.log)
-    assert [uav.acceleration_m_s2 for uav in wanted.mission.uavs] == [3.0, 1.0]
+    assert wanted.rates == {"u1": FlightRates(acceleration_m_s2=1.0)}
 
 
 def test_a_plan_without_the_fields_keys_stays_as_it_was_whatever_vehicles_tell() -> None:

@@ -188,6 +188,24 @@ def test_a_plan_made_for_how_uavs_fly_has_landing_and_climbing_in_its_times() ->
     assert swaps > 0
 
 
+@pytest.mark.parametrize("kind", ["energy", "plain"])
+def test_a_plan_made_for_the_acceleration_of_vehicles_is_that_of_a_mission_that_says_it(
+    kind: str,
+) -> None:
+    mission = mission_of(made_up(1, kind))
+    mission = replace(
+        mission, uavs=tuple(replace(uav, acceleration_m_s2=None) for uav in mission.uavs)
+    )
+    says = replace(mission, uavs=tuple(replace(uav, acceleration_m_s2=0.5) for uav in mission.uavs))
+    rates = {str(uav.id): FlightRates(acceleration_m_s2=0.5) for uav in mission.uavs}
+    told, briefed, plain = (
+        make_plan(each, "greedy", clock=SystemClock(), rates=known)
+        for each, known in ((mission, rates), (says, None), (mission, None))
+    )
+    assert told.completion_s == briefed.completion_s
+    assert told.completion_s != plain.completion_s
+
+
 def test_methods_that_heed_nothing_of_the_field_say_so() -> None:
     mission = mission_of(made_up(1, "energy"))
     for method in ("nearest", "value-per-time"):

@@ -188,6 +188,19 @@ def test_plain_legs_with_acceleration_follow_too() -> None:
     np.testing.assert_array_equal(after.travel_s(1, np.zeros(3)), same.travel_s(1, np.zeros(3)))
 
 
+def test_where_tables_would_get_too_large_legs_are_as_briefed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    told = Board(WITHOUT)
+    before = told.board.field_problem
+    monkeypatch.setattr("swarm.allocation.field.network.MOST_LEGS", 40)  # of 5 nodes for one kind
+    told.say("u1", limited(1.5))
+    after = told.board.field_problem
+    assert before is not None
+    assert after is not None
+    np.testing.assert_array_equal(after.leg_s, before.leg_s)
+
+
 def test_the_scenario_goes_before_the_vehicle() -> None:
     told, fresh = Board(IN_FIELD), Board(IN_FIELD)
     told.say("u1", limited(0.5, 12.0))  # it could fly faster than it is told to
