@@ -152,34 +152,31 @@ class FlightMeter(AgentPart):
         """What this UAV has told of itself, as everybody believes it."""
         return AS_BRIEFED if not self._counts else self._told
 
-    def introduce(self) -> None:
-        """Tell what is known of the vehicle before it flies, if that matters in this mission."""
-        brief, me, told = self._replica.brief, self._mission_view.me, self._told
-        matters = brief is not None and is_calibrated(brief)
-        if self._verticals is None or me is None or me.endurance_s is None or not matters:
-            return
-        if told.land_s == 0.0:
-            before = self._replica.calibrations.get(self._uav)
-            height_m, legs = me.layer_m, 0 if before is None else before.legs
-            land_s = round(self._verticals.land_s(height_m), 1)
-            climb_s = round(self._verticals.climb_s(height_m), 1)
-            self._say(_calibration(replace(told, land_s=land_s, climb_s=climb_s), legs))
+    def introduce(self, limits: FlightLimits | None = None) -> None:
+        """Tell what is known of the vehicle before it flies, if that matters in this mission.
 
-    def heed_limits(self, limits: FlightLimits) -> None:
-        """The vehicle flies so by its parameters: tell it, if that matters in this mission."""
+        Its ``limits`` are told when it has said them; None: it has not, or not yet.
+        """
         brief, me, told = self._replica.brief, self._mission_view.me, self._told
         if brief is None or me is None or not is_calibrated(brief):
             return
-        before = self._replica.calibrations.get(self._uav)
-        limited = Calibration(1.0, 1.0, 0, 0.0, 0.0, limits.acceleration_m_s2, limits.speed_m_s)
-        read = FlightRates.believed(limited, me)
-        acceleration_m_s2 = _limit_anew(told.acceleration_m_s2, read.acceleration_m_s2)
-        speed_m_s = _limit_anew(told.speed_m_s, read.speed_m_s)
-        now = replace(told, acceleration_m_s2=acceleration_m_s2, speed_m_s=speed_m_s)
+        now = told
+        if self._verticals is not None and me.endurance_s is not None and told.land_s == 0.0:
+            land_s = round(self._verticals.land_s(me.layer_m), 1)
+            climb_s = round(self._verticals.climb_s(me.layer_m), 1)
+            now = replace(now, land_s=land_s, climb_s=climb_s)
+        if limits is not None:
+            said = Calibration(1.0, 1.0, 0, 0.0, 0.0, limits.acceleration_m_s2, limits.speed_m_s)
+            read = FlightRates.believed(said, me)
+            acceleration_m_s2 = _limit_anew(told.acceleration_m_s2, read.acceleration_m_s2)
+            speed_m_s = _limit_anew(told.speed_m_s, read.speed_m_s)
+            if (acceleration_m_s2, speed_m_s) != (told.acceleration_m_s2, told.speed_m_s):
+                found = {"acceleration_m_s2": acceleration_m_s2, "speed_m_s": speed_m_s}
+                self._log("flies by its parameters", **found)
+            now = replace(now, acceleration_m_s2=acceleration_m_s2, speed_m_s=speed_m_s)
         if now != told:
+            before = self._replica.calibrations.get(self._uav)
             self._say(_calibration(now, 0 if before is None else before.legs))
-            found = {"acceleration_m_s2": acceleration_m_s2, "speed_m_s": speed_m_s}
-            self._log("flies by its parameters", **found)
 
     # -- legs --------------------------------------------------------------------------
 

@@ -17,7 +17,6 @@ from agent.core.decision import DecisionTurn, RefusedTasks
 from agent.core.energy import TOLERANCE_S
 from agent.core.flights import HomeFlight
 from agent.core.havens import Haven, Havens
-from agent.core.interface import FlightLimits
 from agent.core.states import (
     AT_BASE,
     PAUSED_BY_OPERATOR,
@@ -77,14 +76,6 @@ class FieldTasking(Tasking):
     def recall(self, claim: Claim) -> None:
         """An earlier life of this agent claimed so: what it says of the battery."""
         self._sortie.recall(claim.sortie_end_s)
-
-    def introduce(self) -> None:
-        """The mission is known: tell what is known of the vehicle before it flies."""
-        self._flights.meter.introduce()
-
-    def heed_limits(self, limits: FlightLimits) -> None:
-        """The vehicle has said how it flies by its parameters."""
-        self._flights.meter.heed_limits(limits)
 
     def stand(self, now_s: float, *, found: bool = False) -> bool:
         """Whether it stands at a base, by its last claim or as it was found: stay there."""

@@ -22,6 +22,7 @@ from agent.core.decision import (
     decide_diversion,
 )
 from agent.core.flights import Flights
+from agent.core.interface import FlightLimits
 from agent.core.states import (
     FREE,
     TAKES_TARGETS,
@@ -110,6 +111,10 @@ class Tasking(AgentPart, ABC):
             self._attempt.held_at_s = now_s + self._timing.objection_window_s
         self._say(claim)
         self._log("resumes", task=claim.task)
+
+    def introduce(self, limits: FlightLimits | None = None) -> None:
+        """The mission is known, or the vehicle has said its limits: tell how it will fly."""
+        self._flights.meter.introduce(limits)
 
     def begin(self, now_s: float) -> None:
         """The vehicle takes targets: fly to the resumed task, or be free."""

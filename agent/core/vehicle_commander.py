@@ -95,7 +95,7 @@ class VehicleCommander(AgentPart):
                     self._announcer.explain(reason)
                 self._log("caution", reason=reason)
             case FlightLimits():
-                self._tasking.heed_limits(report)
+                self._tasking.introduce(report)
             case Arrived(leg):
                 self._tasking.arrive(leg, now_s)
             case Landed(leg):

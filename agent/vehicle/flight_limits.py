@@ -52,10 +52,10 @@ class LimitsReading:
     @property
     def kinematics(self) -> Kinematics:
         """How it flies its legs, as far as it has told."""
-        values, overridden = dict(self._parameters.values), self._overridden
-        for name in () if overridden is None else overridden.names:
-            if overridden is not None and name in values:
-                values[name] = overridden.override(overridden.own(values[name]))
+        values, spec = dict(self._parameters.values), self._overridden
+        if spec is not None:
+            found = values.keys() & set(spec.names)
+            values.update({name: spec.override(spec.own(values[name])) for name in found})
         return self._firmware.kinematics(values)
 
 

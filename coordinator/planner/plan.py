@@ -189,8 +189,7 @@ def make_plan(
         bound_frac: share of a limit that is kept for that bound, within 0..1.
         threads: at most this many, of processors if None; changes nothing but speed.
         modest: search little for a sequence; costs 0.1 % of J at 10 × 50, saves most of the time.
-        rates: how UAVs fly, where that is known to be otherwise than the mission says; outside of
-            the field their accelerations and speeds alone.
+        rates: how UAVs fly, where that is known to be otherwise than the mission says.
         bound_progress: told each lower bound when it is found [value·s].
 
     Returns:
@@ -211,11 +210,7 @@ def make_plan(
         asked = (stop, progress, bound_s, bound_frac, threads, modest, rates or {}, bound_progress)
         return make_field_plan(FieldRequest(mission, method, clock, seed, *asked))
     begin_s = clock.now_s()
-    if rates:
-        from swarm.protocol.calibration import fleet_as_told  # no registers on the desk
-
-        mission = fleet_as_told(mission, rates)
-    problem = Problem.from_mission(mission.known_at_start())
+    problem = _problem_of(mission.known_at_start(), rates)
     ends = never if stop is None else stop
     search = _PlanRequest(problem, method, seed, stop, progress, threads, modest, bound_progress)
     keeps = bound_s is not None and bound_frac > 0.0
@@ -244,6 +239,15 @@ def make_plan(
     from coordinator.planner.field_schedule import with_straight_schedule
 
     return with_straight_schedule(plan, problem)
+
+
+def _problem_of(mission: Mission, rates: Mapping[str, FlightRates] | None) -> Problem:
+    """With the accelerations and speeds that vehicles have told."""
+    if rates:
+        from swarm.protocol.calibration import fleet_as_told  # no registers on the desk
+
+        mission = fleet_as_told(mission, rates)
+    return Problem.from_mission(mission)
 
 
 @dataclass(frozen=True, slots=True)

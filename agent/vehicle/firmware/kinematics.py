@@ -24,6 +24,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from enum import Enum
 from typing import Final
 
 _GRAVITY_M_S2: Final = 9.80665
@@ -33,11 +34,22 @@ _ARDUCOPTER_M_S2: Final = 2.5
 """What it flies by where its parameter is 0 (WPNAV_ACCELERATION_MS)."""
 _ENDLESS_M_S2: Final = 50.0
 """Of more than that nobody need take account."""
+
+
+class LegLimit(Enum):
+    """What a parameter limits."""
+
+    ACCELERATION = "acceleration"
+    JERK = "jerk"
+    LEAN = "lean"
+    SPEED = "speed"
+
+
 _CREDIBLE: Final = {
-    "acceleration": (0.1, math.inf),
-    "jerk": (0.1, math.inf),
-    "lean": (1.0, 89.9),
-    "speed": (0.1, math.inf),
+    LegLimit.ACCELERATION: (0.1, math.inf),
+    LegLimit.JERK: (0.1, math.inf),
+    LegLimit.LEAN: (1.0, 89.9),
+    LegLimit.SPEED: (0.1, math.inf),
 }
 """What is believed: accelerations [m/s²], jerks [m/s³], angles of lean [deg] and speeds [m/s]."""
 
@@ -46,29 +58,28 @@ _CREDIBLE: Final = {
 class LimitParameter:
     """One limit under one of the names that its parameter has had."""
 
-    limit: str
-    """``acceleration``, ``jerk``, ``lean`` or ``speed``."""
+    limit: LegLimit
     name: str
     units_per_si: float = 1.0
     """Value of the parameter at 1 m/s², m/s³, degree or m/s."""
 
 
 ARDUCOPTER_LIMITS: Final = (
-    LimitParameter("acceleration", "WP_ACC"),
-    LimitParameter("acceleration", "WPNAV_ACCEL", 100.0),
-    LimitParameter("jerk", "PSC_JERK_NE"),
-    LimitParameter("jerk", "PSC_NE_JERK"),
-    LimitParameter("jerk", "PSC_JERK_XY"),
-    LimitParameter("lean", "ATC_ANGLE_MAX"),
-    LimitParameter("lean", "ANGLE_MAX", 100.0),
+    LimitParameter(LegLimit.ACCELERATION, "WP_ACC"),
+    LimitParameter(LegLimit.ACCELERATION, "WPNAV_ACCEL", 100.0),
+    LimitParameter(LegLimit.JERK, "PSC_JERK_NE"),
+    LimitParameter(LegLimit.JERK, "PSC_NE_JERK"),
+    LimitParameter(LegLimit.JERK, "PSC_JERK_XY"),
+    LimitParameter(LegLimit.LEAN, "ATC_ANGLE_MAX"),
+    LimitParameter(LegLimit.LEAN, "ANGLE_MAX", 100.0),
 )
 """It flies as fast over ground as it is told and its angle of lean permits: no parameter says how
 fast that is."""
 PX4_LIMITS: Final = (
-    LimitParameter("acceleration", "MPC_ACC_HOR"),
-    LimitParameter("jerk", "MPC_JERK_AUTO"),
-    LimitParameter("lean", "MPC_TILTMAX_AIR"),
-    LimitParameter("speed", "MPC_XY_VEL_MAX"),
+    LimitParameter(LegLimit.ACCELERATION, "MPC_ACC_HOR"),
+    LimitParameter(LegLimit.JERK, "MPC_JERK_AUTO"),
+    LimitParameter(LegLimit.LEAN, "MPC_TILTMAX_AIR"),
+    LimitParameter(LegLimit.SPEED, "MPC_XY_VEL_MAX"),
 )
 
 JerkCost = Callable[[float, float, float], float]
@@ -125,7 +136,7 @@ def kinematics_of(
     parameters: tuple[LimitParameter, ...], values: Mapping[str, float], jerk_cost_s: JerkCost
 ) -> Kinematics:
     """What a vehicle is limited by whose parameters have these ``values``, as far as known."""
-    limits: dict[str, NamedLimit] = {}
+    limits: dict[LegLimit, NamedLimit] = {}
     absurd = []
     for parameter in parameters:
         if parameter.name not in values or parameter.limit in limits:
@@ -136,14 +147,15 @@ def kinematics_of(
             limits[parameter.limit] = found
         else:
             absurd.append(found)
-    acceleration, lean, jerk = (limits.get(each) for each in ("acceleration", "lean", "jerk"))
+    acceleration, lean = limits.get(LegLimit.ACCELERATION), limits.get(LegLimit.LEAN)
+    jerk, speed = limits.get(LegLimit.JERK), limits.get(LegLimit.SPEED)
     if lean is not None and acceleration is not None:
         leaning = NamedLimit(lean.name, _GRAVITY_M_S2 * math.tan(math.radians(lean.value)))
         acceleration = min(acceleration, leaning, key=lambda each: each.value)
     if acceleration is not None and acceleration.value > _ENDLESS_M_S2:
         acceleration = None
     jerk_m_s3 = None if jerk is None else jerk.value
-    return Kinematics(acceleration, jerk_m_s3, limits.get("speed"), tuple(absurd), jerk_cost_s)
+    return Kinematics(acceleration, jerk_m_s3, speed, tuple(absurd), jerk_cost_s)
 
 
 def arducopter_kinematics(values: Mapping[str, float]) -> Kinematics:
@@ -151,7 +163,7 @@ def arducopter_kinematics(values: Mapping[str, float]) -> Kinematics:
     known = {
         name: _ARDUCOPTER_M_S2 * parameter.units_per_si
         for parameter in ARDUCOPTER_LIMITS
-        if parameter.limit == "acceleration" and values.get(name := parameter.name) == 0.0
+        if parameter.limit is LegLimit.ACCELERATION and values.get(name := parameter.name) == 0.0
     }
     return kinematics_of(ARDUCOPTER_LIMITS, {**values, **known}, arducopter_jerk_s)
 

@@ -54,7 +54,9 @@ def test_parameters_mean_the_same_under_their_new_and_their_old_names() -> None:
 
 def test_what_is_not_told_is_not_known() -> None:
     for told in (arducopter_kinematics({}), px4_kinematics({})):
-        assert told.acceleration is told.jerk_m_s3 is told.speed is None
+        assert told.acceleration is None
+        assert told.speed is None
+        assert told.jerk_m_s3 is None
         assert told.leg_acceleration_m_s2(8.0) is None
     only = px4_kinematics({"MPC_ACC_HOR": 3.0})
     assert only.leg_acceleration_m_s2(8.0) == 3.0
