@@ -34,6 +34,7 @@ from agent.vehicle.messages import (
     MissionCount,
     MissionCurrent,
     MissionItem,
+    MissionKind,
     MissionReached,
     MissionRequest,
     MissionRequestList,
@@ -60,6 +61,7 @@ _FRAME_BY_WIRE = {
 }
 _LIFTS_NOTHING = (mavlink.MAV_BATTERY_FUNCTION_AVIONICS, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD)
 _LANDED_BY_WIRE = {int(state): state for state in LandedState}
+_KIND_BY_WIRE = {int(kind): kind for kind in MissionKind}
 
 
 class MavlinkCodec:
@@ -236,23 +238,23 @@ class MavlinkCodec:
                 return mavlink.MAVLink_param_set_message(
                     *to, name.encode(), value, mavlink.MAV_PARAM_TYPE_REAL32
                 )
-            case MissionCount(count):
-                return mavlink.MAVLink_mission_count_message(*to, count)
+            case MissionCount(count, kind):
+                return mavlink.MAVLink_mission_count_message(*to, count, kind)
             case MissionItem():
                 head = (message.seq, _INT_FRAME[message.frame], message.command)
                 flags = (int(message.current), int(message.autocontinue))
                 place = (*_wire_place(message.lat_deg, message.lon_deg), message.alt_m)
                 return mavlink.MAVLink_mission_item_int_message(
-                    *to, *head, *flags, *message.params, *place
+                    *to, *head, *flags, *message.params, *place, message.kind
                 )
-            case MissionRequest(seq):
-                return mavlink.MAVLink_mission_request_int_message(*to, seq)
-            case MissionRequestList():
-                return mavlink.MAVLink_mission_request_list_message(*to)
-            case MissionAck(result):
-                return mavlink.MAVLink_mission_ack_message(*to, result)
-            case MissionClearAll():
-                return mavlink.MAVLink_mission_clear_all_message(*to)
+            case MissionRequest(seq, kind):
+                return mavlink.MAVLink_mission_request_int_message(*to, seq, kind)
+            case MissionRequestList(kind):
+                return mavlink.MAVLink_mission_request_list_message(*to, kind)
+            case MissionAck(result, kind):
+                return mavlink.MAVLink_mission_ack_message(*to, result, kind)
+            case MissionClearAll(kind):
+                return mavlink.MAVLink_mission_clear_all_message(*to, kind)
             case MissionSetCurrent(seq):
                 return mavlink.MAVLink_mission_set_current_message(*to, seq)
 
@@ -324,7 +326,7 @@ def _parameter(raw: Any) -> Inbound | None:
     return ParameterValue(raw.param_id, raw.param_value, integer)
 
 
-def _mission_item(raw: Any) -> Inbound | None:
+def _mission_item(raw: Any, kind: MissionKind) -> Inbound | None:
     frame = _FRAME_BY_WIRE.get(raw.frame)
     numbers = (raw.param1, raw.param2, raw.param3, raw.param4)
     if frame is None or not math.isfinite(raw.z):
@@ -339,14 +341,20 @@ def _mission_item(raw: Any) -> Inbound | None:
         params=numbers,
         current=raw.current == 1,
         autocontinue=raw.autocontinue == 1,
+        kind=kind,
     )
 
 
-def _mission(convert: Callable[[Any], Inbound | None]) -> Callable[[Any], Inbound | None]:
-    """Of missions proper only, not of fences and rally points."""
-    return lambda raw: (
-        convert(raw) if raw.mission_type == mavlink.MAV_MISSION_TYPE_MISSION else None
-    )
+def _mission(
+    convert: Callable[[Any, MissionKind], Inbound | None],
+) -> Callable[[Any], Inbound | None]:
+    """Of missions proper and of fences, not of rally points."""
+
+    def convert_known(raw: Any) -> Inbound | None:
+        kind = _KIND_BY_WIRE.get(raw.mission_type)
+        return None if kind is None else convert(raw, kind)
+
+    return convert_known
 
 
 _CONVERTERS: dict[int, Callable[[Any], Inbound | None]] = {
@@ -360,11 +368,11 @@ _CONVERTERS: dict[int, Callable[[Any], Inbound | None]] = {
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK: lambda raw: CommandAck(raw.command, raw.result),
     mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
     mavlink.MAVLINK_MSG_ID_PARAM_ERROR: lambda raw: ParameterMissing(raw.param_id),
-    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: _mission(lambda raw: MissionRequest(raw.seq)),
-    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: _mission(lambda raw: MissionRequest(raw.seq)),
-    mavlink.MAVLINK_MSG_ID_MISSION_COUNT: _mission(lambda raw: MissionCount(raw.count)),
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: _mission(lambda raw, kind: MissionRequest(raw.seq, kind)),
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: _mission(lambda raw, kind: MissionRequest(raw.seq, kind)),
+    mavlink.MAVLINK_MSG_ID_MISSION_COUNT: _mission(lambda raw, kind: MissionCount(raw.count, kind)),
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: _mission(_mission_item),
-    mavlink.MAVLINK_MSG_ID_MISSION_ACK: _mission(lambda raw: MissionAck(raw.type)),
+    mavlink.MAVLINK_MSG_ID_MISSION_ACK: _mission(lambda raw, kind: MissionAck(raw.type, kind)),
     mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda raw: MissionCurrent(raw.seq),
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: lambda raw: MissionReached(raw.seq),
 }

@@ -28,6 +28,14 @@ class AltitudeFrame(IntEnum):
     HOME = 3
 
 
+class MissionKind(IntEnum):
+    """MAV_MISSION_TYPE: what is transferred by the mission protocol."""
+
+    FLIGHT = 0
+    """Mission items proper."""
+    FENCE = 1
+
+
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
     """HEARTBEAT of an autopilot."""
@@ -137,6 +145,7 @@ class MissionRequest:
     """MISSION_REQUEST or MISSION_REQUEST_INT: asks for one item."""
 
     seq: int
+    kind: MissionKind = MissionKind.FLIGHT
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,6 +153,7 @@ class MissionCount:
     """MISSION_COUNT: announces that many items."""
 
     count: int
+    kind: MissionKind = MissionKind.FLIGHT
 
 
 @dataclass(frozen=True, slots=True)
@@ -161,6 +171,7 @@ class MissionItem:
     params: tuple[float, float, float, float] = (0.0, 0.0, 0.0, 0.0)
     current: bool = False
     autocontinue: bool = True
+    kind: MissionKind = MissionKind.FLIGHT
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,6 +180,7 @@ class MissionAck:
 
     result: int
     """MAV_MISSION_RESULT; 0 is accepted."""
+    kind: MissionKind = MissionKind.FLIGHT
 
 
 @dataclass(frozen=True, slots=True)
@@ -260,6 +272,8 @@ class ParameterSet:
 class MissionRequestList:
     """MISSION_REQUEST_LIST: asks how many items there are."""
 
+    kind: MissionKind = MissionKind.FLIGHT
+
 
 @dataclass(frozen=True, slots=True)
 class MissionSetCurrent:
@@ -271,6 +285,8 @@ class MissionSetCurrent:
 @dataclass(frozen=True, slots=True)
 class MissionClearAll:
     """MISSION_CLEAR_ALL, answered by a `MissionAck`."""
+
+    kind: MissionKind = MissionKind.FLIGHT
 
 
 Outbound = (

@@ -4,7 +4,8 @@ The read-back decides: an upload whose acknowledgement got lost is still good if
 the same items, and one that was acknowledged is not if it tells others. After any failure the last
 verified mission stays the one in force; where the vehicle may hold part of the new one, the old one
 is uploaded again before the failure is reported; if none was ever verified, all is cleared, so that
-no half mission can be flown. A vehicle may also be asked what stands on it.
+no half mission can be flown. A vehicle may also be asked what stands on it, and be told to
+clear it. Fences are transferred in the same way, apart from missions.
 
 Protocol: https://mavlink.io/en/services/mission.html
 """
@@ -23,6 +24,7 @@ from agent.vehicle.messages import (
     MissionClearAll,
     MissionCount,
     MissionItem,
+    MissionKind,
     MissionRequest,
     MissionRequestList,
     Outbound,
@@ -30,6 +32,7 @@ from agent.vehicle.messages import (
 
 _ACCEPTED = 0
 _ERROR = 1
+_UNSUPPORTED = 3
 _INVALID_SEQUENCE = 13
 _OPERATION_CANCELLED = 15
 """MAV_MISSION_RESULT values."""
@@ -75,6 +78,8 @@ class MissionFailed:
     reason: str
     old_mission_verified: bool
     """The vehicle was seen to hold the old mission, or none at all; if not, do not start one."""
+    unsupported: bool = False
+    """The vehicle says that it knows no missions of that kind, or no such item."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,10 +102,11 @@ class _Phase(Enum):
 
 
 class MissionTransfer:
-    """Uploads missions to one vehicle, one at a time."""
+    """Uploads missions of one kind to one vehicle, one at a time."""
 
-    def __init__(self, policy: MissionPolicy) -> None:
+    def __init__(self, policy: MissionPolicy, kind: MissionKind = MissionKind.FLIGHT) -> None:
         self._policy = policy
+        self._kind = kind
         self._phase = _Phase.IDLE
         self._items: tuple[MissionItem, ...] = ()
         self._read_back: list[MissionItem] = []
@@ -120,6 +126,7 @@ class MissionTransfer:
         """How many items are worth reading of a vehicle that is only asked; None while
         something is uploaded."""
         self._failure: str | None = None
+        self._unsupported = False
         self.in_force: tuple[MissionItem, ...] | None = None
         """Items last verified on the vehicle; None if none ever were."""
         self.result: MissionInForce | MissionFailed | MissionRead | None = None
@@ -141,8 +148,7 @@ class MissionTransfer:
             raise ValueError("a mission transfer is under way already")
         if not items or [item.seq for item in items] != list(range(len(items))):
             raise ValueError("mission items must be numbered 0, 1, 2, … without a gap")
-        self._failure = self._reading = None
-        self.result, self._cleared = None, False
+        self._begin(None)
         return self._announce(tuple(items), now_s)
 
     def read(self, counts: Collection[int], now_s: float) -> list[Outbound]:
@@ -153,12 +159,25 @@ class MissionTransfer:
         """
         if self.busy:
             raise ValueError("a mission transfer is under way already")
-        self._failure, self._reading = None, counts
-        self.result, self._cleared = None, False
+        self._begin(counts)
         return self._ask_count(now_s)
+
+    def clear(self, now_s: float) -> list[Outbound]:
+        """Begin to leave nothing on the vehicle; it is done when that is in force.
+
+        Raises:
+            ValueError: a transfer is under way.
+        """
+        if self.busy:
+            raise ValueError("a mission transfer is under way already")
+        self._begin(None)
+        self.in_force, self._touched = None, True
+        return self._clear(now_s)
 
     def on_message(self, message: Inbound, now_s: float) -> list[Outbound]:
         """Go on with the transfer; messages that do not belong to it change nothing."""
+        if getattr(message, "kind", None) is not self._kind:
+            return []
         match message:
             case MissionRequest(seq) if self._phase in (_Phase.ANNOUNCING, _Phase.SENDING):
                 return self._on_request(seq, now_s)
@@ -167,7 +186,11 @@ class MissionTransfer:
             case MissionAck(result) if self._phase is _Phase.ANNOUNCING and result != _ACCEPTED:
                 if result == _ERROR:
                     return []  # PX4 is busy with an older transfer until that times out
-                return self._fail(f"the vehicle refused the mission (result {result})", now_s)
+                return self._refused(result, now_s)
+            case MissionAck(result) if (
+                result == _UNSUPPORTED and self._reading is not None and self.busy
+            ):
+                return self._refused(result, now_s)
             case MissionAck(result) if self._phase is _Phase.CLEARING and result == _ACCEPTED:
                 # Perhaps an older transfer's: the count will tell.
                 self._cleared = True
@@ -197,7 +220,7 @@ class MissionTransfer:
 
     def cancel(self, reason: str) -> list[Outbound]:
         """Stop at once, and tell the vehicle; nothing is restored."""
-        out: list[Outbound] = [MissionAck(_OPERATION_CANCELLED)] if self.busy else []
+        out: list[Outbound] = [self._ack(_OPERATION_CANCELLED)] if self.busy else []
         self.abort(reason)
         return out
 
@@ -211,12 +234,19 @@ class MissionTransfer:
         """When `on_time` has something to do; None while idle."""
         return self._deadline_s if self.busy else None
 
+    def _begin(self, reading: Collection[int] | None) -> None:
+        self._failure = self.result = None
+        self._reading, self._cleared, self._unsupported = reading, False, False
+
+    def _ack(self, result: int) -> MissionAck:
+        return MissionAck(result, self._kind)
+
     def _announce(self, items: tuple[MissionItem, ...], now_s: float) -> list[Outbound]:
         self._items = items
         self._phase = _Phase.ANNOUNCING
         self._furthest_seq = -1
         self._second_reading = self._began_reading_anew = False
-        return self._say([MissionCount(len(items))], now_s)
+        return self._say([MissionCount(len(items), self._kind)], now_s)
 
     def _on_request(self, seq: int, now_s: float) -> list[Outbound]:
         if seq >= len(self._items):
@@ -225,7 +255,7 @@ class MissionTransfer:
             # PX4 goes on with an older transfer until it hears that this one was given up.
             if self._tries >= self._policy.tries:
                 return self._fail("the vehicle is busy with another transfer", now_s)
-            out: list[Outbound] = [MissionAck(_OPERATION_CANCELLED), *self._last]
+            out: list[Outbound] = [self._ack(_OPERATION_CANCELLED), *self._last]
             self._say(self._last, now_s, again=True)
             return out
         self._touched = True
@@ -241,7 +271,7 @@ class MissionTransfer:
         if result in (_INVALID_SEQUENCE, _ERROR):
             return []  # an answer to what came twice; a transfer that ended asks no more
         if result != _ACCEPTED:
-            return self._fail(f"the vehicle refused the mission (result {result})", now_s)
+            return self._refused(result, now_s)
         if self._furthest_seq != len(self._items) - 1:
             return []  # an older transfer's: this one is not through yet
         return self._ask_count(now_s)
@@ -249,7 +279,7 @@ class MissionTransfer:
     def _ask_count(self, now_s: float) -> list[Outbound]:
         self._phase = _Phase.ASKING_COUNT
         self._read_back = []
-        return self._say([MissionRequestList()], now_s)
+        return self._say([MissionRequestList(self._kind)], now_s)
 
     def _on_count(self, count: int, now_s: float) -> list[Outbound]:
         if self._cleared:
@@ -257,20 +287,23 @@ class MissionTransfer:
         if self._reading is not None and count not in self._reading:
             self._phase = _Phase.IDLE
             self.result = MissionRead(count, ())
-            return [MissionAck(_ACCEPTED)]
+            return [self._ack(_ACCEPTED)]
         if self._reading is None and count != len(self._items):
             return self._differs(f"it holds {count} items, not {len(self._items)}", now_s)
         self._count = count
         self._phase = _Phase.ASKING_ITEMS
-        return self._say([MissionRequest(0)], now_s)
+        return self._say([MissionRequest(0, self._kind)], now_s)
 
     def _on_count_of_cleared(self, count: int, now_s: float) -> list[Outbound]:
         if count > self._policy.vehicle_items:
             return self._fail("it is not cleared", now_s)
         self._touched = False
         self._phase = _Phase.IDLE
-        self.result = MissionFailed(self._failure or "", old_mission_verified=True)
-        return [MissionAck(_ACCEPTED)]
+        if self._failure is None:
+            self.result = MissionInForce(())
+        else:
+            self.result = MissionFailed(self._failure, True, self._unsupported)
+        return [self._ack(_ACCEPTED)]
 
     def _on_item(self, item: MissionItem, now_s: float) -> list[Outbound]:
         wanted = len(self._read_back)
@@ -282,7 +315,7 @@ class MissionTransfer:
             return self._differs(f"item {wanted} differs", now_s)
         self._read_back.append(item)
         if len(self._read_back) < self._count:
-            return self._say([MissionRequest(wanted + 1)], now_s)
+            return self._say([MissionRequest(wanted + 1, self._kind)], now_s)
         return self._verified()
 
     def _differs(self, what: str, now_s: float) -> list[Outbound]:
@@ -296,26 +329,33 @@ class MissionTransfer:
         self._phase = _Phase.IDLE
         if self._reading is not None:
             self.result = MissionRead(self._count, tuple(self._read_back))
-            return [MissionAck(_ACCEPTED)]
+            return [self._ack(_ACCEPTED)]
         self._touched = False
         if self._failure is None:
             self.in_force = self._items
             self.result = MissionInForce(self._items)
         else:
-            self.result = MissionFailed(self._failure, old_mission_verified=True)
-        return [MissionAck(_ACCEPTED)]
+            self.result = MissionFailed(self._failure, True, self._unsupported)
+        return [self._ack(_ACCEPTED)]
+
+    def _refused(self, result: int, now_s: float) -> list[Outbound]:
+        self._unsupported |= self._failure is None and result == _UNSUPPORTED
+        return self._fail(f"the vehicle refused the mission (result {result})", now_s)
+
+    def _clear(self, now_s: float) -> list[Outbound]:
+        self._phase = _Phase.CLEARING
+        return self._say([MissionClearAll(self._kind)], now_s)
 
     def _fail(self, reason: str, now_s: float) -> list[Outbound]:
-        out: list[Outbound] = [MissionAck(_OPERATION_CANCELLED)]
+        out: list[Outbound] = [self._ack(_OPERATION_CANCELLED)]
         if self._failure is None:
             self._failure = reason
             if self._touched and self._reading is None:
                 if self.in_force is not None:
                     return out + self._announce(self.in_force, now_s)
-                self._phase = _Phase.CLEARING
-                return out + self._say([MissionClearAll()], now_s)
+                return out + self._clear(now_s)
         self._phase = _Phase.IDLE
-        self.result = MissionFailed(self._failure or reason, not self._touched)
+        self.result = MissionFailed(self._failure or reason, not self._touched, self._unsupported)
         return out
 
     def _say(
