@@ -301,6 +301,8 @@ class Bridge:
                 self._streams.on_ended(one, session.now_s)
             if session.mission is not None:
                 session.mission.on_ended(one)
+            if session.fence is not None:
+                session.fence.on_ended(one)
             self._activity.on_ended(one)
             self._settle()
 
@@ -324,6 +326,7 @@ class Bridge:
             self._settle()
             self._activity = follow_mission(self._activity, session)
             self._advance_override()
+            self._advance_fence()
         self._activity.advance()
         self._settle()
 
@@ -332,6 +335,19 @@ class Bridge:
         session = self._session
         loss = LinkLoss(session, tuple(session.sent_to_enu_m))
         self._activity = hand_over(session, session.vehicle.silence(session.now_s), loss=loss)
+
+    def _advance_fence(self) -> None:
+        """Have the zones on a vehicle that flies for us, and not on one that does not any more."""
+        session, activity = self._session, self._activity
+        if session.fence is None:
+            return
+        if activity.in_our_hands and session.vehicle.armed:
+            session.advance_fence()
+        elif isinstance(activity, Idle) and not session.vehicle.armed:
+            session.take_fence_off()
+        elif session.vehicle.armed or isinstance(activity, Standing | HandOver):
+            session.abort_fence()
+        session.tell_caution("fence", session.fence.caution)
 
     def _advance_override(self) -> None:
         """Raise the limit of jerk from its preparation on, until it is told to go home."""
@@ -345,4 +361,4 @@ class Bridge:
         session.override.want(self._raises_jerk and activity.in_our_hands)
         session.say(*session.override.advance(session.now_s))
         if complaint := session.override.take_complaint():
-            session.tell_caution(complaint)
+            session.tell_caution("parameter", complaint)

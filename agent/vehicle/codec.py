@@ -368,8 +368,12 @@ _CONVERTERS: dict[int, Callable[[Any], Inbound | None]] = {
     mavlink.MAVLINK_MSG_ID_COMMAND_ACK: lambda raw: CommandAck(raw.command, raw.result),
     mavlink.MAVLINK_MSG_ID_PARAM_VALUE: _parameter,
     mavlink.MAVLINK_MSG_ID_PARAM_ERROR: lambda raw: ParameterMissing(raw.param_id),
-    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: _mission(lambda raw, kind: MissionRequest(raw.seq, kind)),
-    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: _mission(lambda raw, kind: MissionRequest(raw.seq, kind)),
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST: _mission(
+        lambda raw, kind: MissionRequest(raw.seq, kind)
+    ),
+    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT: _mission(
+        lambda raw, kind: MissionRequest(raw.seq, kind)
+    ),
     mavlink.MAVLINK_MSG_ID_MISSION_COUNT: _mission(lambda raw, kind: MissionCount(raw.count, kind)),
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: _mission(_mission_item),
     mavlink.MAVLINK_MSG_ID_MISSION_ACK: _mission(lambda raw, kind: MissionAck(raw.type, kind)),

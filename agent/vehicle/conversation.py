@@ -39,6 +39,7 @@ class Conversation:
         self._actions: list[BridgeAction] = []
         self._told_not_ready: str | None = None
         self._told_caution: str | None = None
+        self._cautions: dict[str, str] = {}
 
     def send(self, tag: str, command: VehicleCommand) -> None:
         """See `CommandQueue.send`."""
@@ -69,15 +70,21 @@ class Conversation:
             self._told_not_ready = reason
             self.report(NotReady(reason))
 
-    def tell_caution(self, reason: str) -> None:
-        """Report what people should know of the vehicle, once."""
-        if reason != self._told_caution:
-            self._told_caution = reason
-            self.report(Caution(reason))
+    def tell_caution(self, topic: str, reason: str | None) -> None:
+        """Report what people should know of the vehicle, once; None: no more of that topic."""
+        if reason is None:
+            self._cautions.pop(topic, None)
+            return
+        self._cautions[topic] = reason
+        told = "; ".join(self._cautions.values())
+        if told != self._told_caution:
+            self._told_caution = told
+            self.report(Caution(told))
 
     def tell_anew(self) -> None:
         """Another wait begins: what was told may be told again."""
         self._told_not_ready = self._told_caution = None
+        self._cautions.clear()
 
     def take_actions(self) -> list[BridgeAction]:
         """What was said and reported, in order, once."""

@@ -102,6 +102,7 @@ def hand_over(
     session.commands.cancel_all()
     if session.mission is not None:
         session.mission.abort(reason)
+    session.abort_fence()
     session.report(HandedOver(reason, silent=loss is not None))
     return HandOver(session, explanation, loss)
 

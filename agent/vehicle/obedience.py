@@ -35,7 +35,6 @@ from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning, ReturnVia
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.standing import Departing, Standing
-from agent.vehicle.zone_guard import ZoneGuard
 
 _UNHEARD_TIMEOUTS = 3.0
 """A vehicle that may be in the air has that many silence timeouts to be heard at all."""
@@ -99,7 +98,7 @@ def obey(activity: Activity, order: VehicleOrder, session: VehicleSession) -> Ac
                 activity.let_start()
             return activity
         case KeepOut(zones, margin_m):
-            session.guard = ZoneGuard(zones, margin_m)
+            session.keep_out(zones, margin_m)
             return activity
 
 
@@ -231,6 +230,7 @@ def stand_there(
     session: VehicleSession, order: Swap, since_s: float, *, may_start: bool = False
 ) -> Standing:
     """It has landed for another battery."""
+    session.abort_fence()
     session.report(Landed(order.leg))
     return Standing(session, order, since_s, may_start=may_start)
 
@@ -336,6 +336,8 @@ def return_home(activity: Activity, order: Return, session: VehicleSession) -> A
         motors_asked = isinstance(activity, Preparing) and activity.in_our_hands
         if commanded and (heartbeat.armed or motors_asked):
             session.send("disarm", firmware.disarm())
+        elif session.fence is not None and session.fence.stands:
+            return Returning(session, firmware, order)  # it stands; its fence is taken off first
         session.report(Home())
         return Idle(session)
     if session.silent:
@@ -368,6 +370,7 @@ def _return_via(order: Return, firmware: Firmware, session: VehicleSession) -> R
 
 def refuse_return(order: Return, reason: str, session: VehicleSession) -> Activity:
     """Say that it cannot be brought home, and leave it alone."""
+    session.abort_fence()
     session.report(Refused(order, reason))
     return HandOver(session)
 

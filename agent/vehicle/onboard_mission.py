@@ -16,7 +16,7 @@ Protocol: https://mavlink.io/en/services/mission.html
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from enum import Enum, auto
 
@@ -63,10 +63,22 @@ class _Stage(Enum):
 
 
 class OnboardMission:
-    """What one vehicle does if it hears nothing more."""
+    """What one vehicle does if it hears nothing more.
 
-    def __init__(self, conversation: Conversation, firmware: Firmware) -> None:
+    Args:
+        conversation: with the vehicle.
+        firmware: which it is.
+        free_line: called before a transfer begins, to end any other one.
+    """
+
+    def __init__(
+        self,
+        conversation: Conversation,
+        firmware: Firmware,
+        free_line: Callable[[], None] = lambda: None,
+    ) -> None:
         self._conversation = conversation
+        self._free_line = free_line
         self._config = config = conversation.config
         self._firmware = firmware
         vehicle_items = firmware.mission_vehicle_items
@@ -171,6 +183,11 @@ class OnboardMission:
         return self._stage is _Stage.UPLOADING_FIRST
 
     @property
+    def is_transferring(self) -> bool:
+        """Whether a mission is on its way to the vehicle, or read from it."""
+        return self._transfer.busy
+
+    @property
     def may_be_flown(self) -> bool:
         """Whether the vehicle may be in the mission mode because of us."""
         return self._mode_seen or self._mode_asked
@@ -221,6 +238,7 @@ class OnboardMission:
         self._look_at_s = now_s + self._config.retry_delay_s
         own = self._firmware.mission_vehicle_items
         counts = {MissionSeqs(own, corners=corners).count for corners in range(MOST_CORNERS + 1)}
+        self._free_line()
         self._conversation.say(*self._transfer.read(counts, now_s))
 
     def expects(self, custom_mode: int) -> bool:
@@ -310,6 +328,7 @@ class OnboardMission:
 
     def _upload(self, plan: MissionPlan) -> list[Outbound]:
         self._sent = plan
+        self._free_line()
         return self._transfer.upload(plan.items(self._firmware), self._conversation.now_s)
 
     def _settle(self) -> None:

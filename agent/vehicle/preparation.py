@@ -267,6 +267,8 @@ class _Preparation:
             return self._fail(fault)
         if objection := self._failsafes.objection:
             return self._wait(objection)
+        if objection := self._session.advance_fence():
+            return self._wait(objection)
         if self._mission is not None and not self._mission.is_uploaded:
             return self._upload_way_home(self._mission)
         self._consent.arm()
@@ -500,6 +502,6 @@ class Preparing(Activity):
         preparation = self._preparation
         preparation.advance(heartbeat)
         if preparation.caution is not None:
-            session.tell_caution(preparation.caution)
+            session.tell_caution("failsafes", preparation.caution)
         if not preparation.done and preparation.failure is None:
             session.tell_not_ready(preparation.waiting_for)

@@ -16,12 +16,14 @@ from agent.vehicle.contact import Contact
 from agent.vehicle.conversation import Conversation
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import Inbound
+from agent.vehicle.onboard_fence import OnboardFence
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.parameter_override import ParameterOverride
 from agent.vehicle.signing import Signing
 from agent.vehicle.state import PositionFilter, VehicleState
 from agent.vehicle.supervision import CruiseWatch, SafetyMonitor
 from agent.vehicle.zone_guard import ZoneGuard
+from swarm.model import Zone
 from swarm.protocol.fields import Point
 from swarm.protocol.timing import earliest
 
@@ -73,6 +75,8 @@ class VehicleSession(Conversation):
         self.firmware: Firmware | None = None
         self.mission: OnboardMission | None = None
         """What stands on the vehicle; None if missions are not our way to command it."""
+        self.fence: OnboardFence | None = None
+        """Zones on the vehicle as its own fence; None as long as it is not known what it is."""
         self.override: ParameterOverride | None = None
         """What is another parameter during a flight; None if nothing is."""
         self.cruise_speed_m_s = 0.0
@@ -87,6 +91,7 @@ class VehicleSession(Conversation):
         """Names of those whose values nobody would believe."""
         self.guard = ZoneGuard(config.zones, config.zone_margin_m)
         """Where not to fly."""
+        self._zones: Sequence[Zone] = config.zones
         self.launched_enu_m: Point | None = None
         """Where it took off on our order, to which its return mode leads; None: not known."""
         self.tells_charge = False
@@ -119,6 +124,12 @@ class VehicleSession(Conversation):
             return "where it is is not known, and zones are to be kept out of"
         return self.guard.objection((place_enu_m, *way_enu_m))
 
+    def keep_out(self, zones: Sequence[Zone], margin_m: float) -> None:
+        """Heed these zones from now on, in place of those before."""
+        self._zones, self.guard = zones, ZoneGuard(zones, margin_m)
+        if self.fence is not None:
+            self.fence.keep_out(zones)
+
     @property
     def silent(self) -> bool:
         """Whether it has not been heard for too long."""
@@ -149,13 +160,20 @@ class VehicleSession(Conversation):
             self.commands.acknowledged_twice = firmware.acknowledged_twice
             if firmware.override_spec is not None and self.config.raises_jerk:
                 self.override = ParameterOverride(firmware.override_spec, self.config.commands)
+        self.fence = None
         self.forget_mission()
 
     def forget_mission(self) -> None:
-        """Know nothing of what stands on the vehicle."""
+        """Know nothing of what stands on the vehicle, but for a fence that we have put there."""
         self.mission = None
-        if self.firmware is not None and self.config.command is CommandStyle.MISSION:
-            self.mission = OnboardMission(self, self.firmware)
+        if self.firmware is None:
+            return
+        if self.config.command is CommandStyle.MISSION:
+            self.mission = OnboardMission(self, self.firmware, self._free_line)
+        if self.fence is None or not self.fence.stands:
+            self.fence = OnboardFence(self, self.firmware)
+            self.fence.keep_out(self.config.zones)
+            self.fence.keep_out(self._zones)
 
     def flies_for_us(self, custom_mode: int) -> bool:
         """Whether that mode is our doing, as far as targets go."""
@@ -180,8 +198,33 @@ class VehicleSession(Conversation):
         """Pass on what is no heartbeat, position or acknowledgement."""
         if self.mission is not None:
             self.mission.on_message(message)
+        if self.fence is not None:
+            self.fence.on_message(message)
         if self.override is not None:
             self.override.on_message(message)
+
+    def advance_fence(self) -> str | None:
+        """Carry on with its fence; why it is not started before, in words."""
+        fence, position = self.fence, self.vehicle.position
+        if fence is None:
+            return None
+        home_m = 0.0 if position is None else position.alt_m - position.relative_alt_m
+        free = self.mission is None or not self.mission.is_transferring
+        fence.advance(self.known_place_m(), home_m - self.config.origin.alt_m, may_begin=free)
+        return fence.objection
+
+    def take_fence_off(self) -> bool:
+        """Leave no fence of ours on a vehicle that has landed; whether that is over."""
+        return self.fence is None or self.fence.take_off()
+
+    def abort_fence(self) -> None:
+        """Say nothing more of its fence."""
+        if self.fence is not None:
+            self.fence.abort()
+
+    def _free_line(self) -> None:
+        if self.fence is not None:
+            self.fence.interrupt()
 
     def advance_mission(self) -> None:
         """Carry on what stands on the vehicle, or is on its way there."""
@@ -190,13 +233,14 @@ class VehicleSession(Conversation):
             self.mission.advance(heartbeat, heard_s)
 
     def mission_deadline_s(self) -> float:
-        """When mission or parameter may have something to do."""
+        """When mission, fence or parameter may have something to do."""
         if self.mission is not None and self.mission.is_starting:
             return self.now_s + POLL_S
         override = self.override
         due_s = earliest(
             None if self.mission is None else self.mission.next_deadline_s(),
             None if override is None or self.silent else override.next_deadline_s(),
+            None if self.fence is None or self.silent else self.fence.next_deadline_s(),
         )
         return math.inf if due_s is None else max(due_s, self.now_s)
 
@@ -210,5 +254,5 @@ class VehicleSession(Conversation):
         self.vehicle = VehicleState()
         self.safety = SafetyMonitor(self.config)
         self.position_filter = PositionFilter()
-        self.firmware = self.mission = self.override = None
+        self.firmware = self.mission = self.override = self.fence = None
         self.commands.cancel_all()

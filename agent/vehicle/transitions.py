@@ -220,6 +220,8 @@ def _after_landing(landing: Landing, session: VehicleSession) -> Activity:
     if landing.taken is not None:
         return hand_over(session, landing.taken)
     if landing.is_down:
+        if not session.take_fence_off():
+            return landing
         session.commands.cancel_all()
         return stand_there(session, landing.order, session.now_s)
     if landing.failure is not None:
@@ -241,6 +243,8 @@ def _after_return(returning: Returning, session: VehicleSession) -> Activity:
     if returning.has_begun():
         session.report(ReturnBegun())
     if returning.is_down:
+        if not session.take_fence_off():
+            return returning
         session.commands.cancel_all()
         session.report(Home())
         return Idle(session)

@@ -20,7 +20,9 @@
 10. What it makes the vehicle do next may follow what it made it do before.
 11. No target lies in a zone, nor straight behind one from wherever the vehicle said it was or was
    sent, unless that is in the zone too.
-12. A vehicle that has landed for another battery is not told anything, and its motors are not
+12. A fence is put on a vehicle of corners of zones that were told, outside of which it has been,
+and neither where it stands at a base nor once it is somebody else's.
+13. A vehicle that has landed for another battery is not told anything, and its motors are not
    started before somebody has let it start again since.
 
 Leaves out: whether it does anything useful.
@@ -72,9 +74,11 @@ from tests.support.fake_copter import (
     REPOSITION,
     SET_MODE,
     SPEED,
+    SWITCH_FENCE,
     TAKEOFF,
     FakeCopter,
 )
+from tests.support.fake_fences import EXCLUSION, FENCE, INCLUSION
 from tests.support.fake_px4 import FakePx4
 
 _MODE_ENABLED = 1.0
@@ -106,13 +110,13 @@ _MISSION_READING = {"MISSION_REQUEST_INT", "MISSION_REQUEST_LIST", "MISSION_ACK"
 _WITHOUT_MISSION = {FlightPhase.IDLE, FlightPhase.RETURNING}
 _WAYPOINT = 16
 _COMMANDS: dict[FlightPhase, set[int]] = {
-    FlightPhase.IDLE: {ARM},
-    FlightPhase.PREPARING: {SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED},
-    FlightPhase.HOVERING: {REPOSITION},
-    FlightPhase.FLYING: {REPOSITION},
-    FlightPhase.HOLDING: {SET_MODE, REPOSITION, ARM},
-    FlightPhase.RETURNING: {SET_MODE, REPOSITION},
-    FlightPhase.LANDING: {SET_MODE, REPOSITION, ARM},
+    FlightPhase.IDLE: {ARM, SWITCH_FENCE},
+    FlightPhase.PREPARING: {SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, SWITCH_FENCE},
+    FlightPhase.HOVERING: {REPOSITION, SWITCH_FENCE},
+    FlightPhase.FLYING: {REPOSITION, SWITCH_FENCE},
+    FlightPhase.HOLDING: {SET_MODE, REPOSITION, ARM, SWITCH_FENCE},
+    FlightPhase.RETURNING: {SET_MODE, REPOSITION, SWITCH_FENCE},
+    FlightPhase.LANDING: {SET_MODE, REPOSITION, ARM, SWITCH_FENCE},
     FlightPhase.STANDING: set(),
     FlightPhase.HANDED_OVER: set(),
 }
@@ -192,6 +196,8 @@ class BridgeWatch:
         self._mode_wanted: set[tuple[float, float]] = set()
         self._zones: list[tuple[Zone, float]] = []
         """To be kept out of, and how far."""
+        self._told_zones: set[Zone] = set()
+        """All that it was ever told."""
         self._base_m: Point | None = None
         """Where it was last ordered to land for another battery."""
         self._swap_leg: int | None = None
@@ -209,6 +215,7 @@ class BridgeWatch:
             self._note(event)
         elif isinstance(event, KeepOut):
             self._zones = [(zone, event.margin_m) for zone in event.zones]
+            self._told_zones.update(event.zones)
         elif isinstance(event, Ready):
             let = before is FlightPhase.STANDING and event.leg == self._swap_leg
             self._may_start |= let
@@ -283,7 +290,12 @@ class BridgeWatch:
             self._see_jerk(message)
             return
         hold(not self._silent, f"{name} after a hand-over: {message}")
-        if name in ("PARAM_REQUEST_READ", "PARAM_SET"):
+        if getattr(message, "mission_type", 0) == FENCE:
+            self._see_fence(name, message, phases)
+            return
+        if name == "PARAM_REQUEST_READ" and message.param_id in self.fake.fence_names:
+            hold(bool(self._told_zones), "asks for its fence, though there is no zone")
+        elif name in ("PARAM_REQUEST_READ", "PARAM_SET"):
             hold(FlightPhase.PREPARING in phases, f"{name} while {before}, {after}")
             readable = self.fake.failsafe_names | self.fake.limit_names
             read = readable if name == "PARAM_REQUEST_READ" else frozenset()
@@ -304,6 +316,31 @@ class BridgeWatch:
             self._see_command(message, phases, missions=missions)
         else:
             hold(False, f"sends {name}")
+
+    def _see_fence(self, name: str, message: Any, phases: set[FlightPhase]) -> None:
+        """What is put there is part of a zone, and the vehicle has been outside of it."""
+        hold(bool(self._told_zones), f"{name} of a fence, though there is no zone")
+        hold(phases != {FlightPhase.STANDING}, f"{name} of a fence while {phases}")
+        if name in ("MISSION_COUNT", "MISSION_ITEM_INT"):
+            hold(phases != {FlightPhase.IDLE}, f"{name} of a fence while {phases}")
+        if name != "MISSION_ITEM_INT":
+            return
+        hold(message.command in (INCLUSION, EXCLUSION), f"fence item {message.command}")
+        config = self.bridge.config
+        corner_m = enu_from_wgs84(
+            config.origin, message.x / 1e7, message.y / 1e7, config.origin.alt_m
+        )[:2]
+        places_m = [*self._heres_m, *self._task.told_m]
+        outside = False
+        for zone in self._told_zones:
+            at = any(math.dist(corner_m, corner) <= _TOLERANCE_M for corner in zone.polygon_enu_m)
+            shape = zone.shape()
+            outside |= at and any(
+                shape.contains(shapely.Point(place_m[:2])) is zone.inclusive
+                for place_m, _ in places_m
+                if all(map(math.isfinite, place_m[:2]))
+            )
+        hold(outside, f"a fence put over it, or of no zone, at {corner_m}")
 
     def _see_jerk(self, message: Any) -> None:
         """Raised in flight only; put back at any time, even after a hand-over: it moves nothing."""
@@ -346,6 +383,9 @@ class BridgeWatch:
             case 176:
                 hold(message.param1 == _MODE_ENABLED, f"mode of kind {message.param1}")
                 self._see_mode(message, phases, missions=missions)
+            case 207:
+                hold(self.fake is FakeCopter, "switches a fence that has no switch")
+                hold(message.param2 == 4.0, f"switches fences {message.param2}")
             case 178:
                 hold(0.0 < message.param2 < 100.0, f"speed {message.param2} m/s")
 

@@ -15,6 +15,7 @@ from typing import Any, ClassVar
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from swarm.model.frames import Origin, enu_from_wgs84, wgs84_from_enu
+from tests.support.fake_fences import FENCE, FakeFence
 from tests.support.fake_missions import CopterMissions
 
 Point = tuple[float, float, float]
@@ -22,6 +23,7 @@ Point = tuple[float, float, float]
 STABILIZE, AUTO, GUIDED, LOITER, RTL, LAND = 0, 3, 4, 5, 6, 9
 ACCEPTED, BUSY, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, INTERVAL = 176, 400, 22, 192, 178, 511
+SWITCH_FENCE = 207
 
 _CLIMB_M_S = 2.5
 _AUTO_DISARM_S = 10.0
@@ -63,6 +65,10 @@ class FakeCopter:
         }
     )
     """What may be read of it to know how it flies its legs."""
+    fence_names = frozenset({"FENCE_ENABLE", "FENCE_TYPE", "FENCE_ACTION", "FENCE_AUTOENABLE"})
+    """What is read of its fence."""
+    fence_as_int = False
+    """Whether it asks for the corners of a fence by the newer message."""
     jerk_names: tuple[str, ...] = ("WP_JERK", "WPNAV_JERK")
     """Names that the parameter of the greatest jerk may have."""
 
@@ -113,11 +119,16 @@ class FakeCopter:
             "MAV_GCS_SYSID": 255.0,
             "MAV_GCS_SYSID_HI": 0.0,
             "BATT_FS_LOW_ACT": 2.0,
+            "FENCE_ENABLE": 0.0,
+            "FENCE_TYPE": 7.0,
+            "FENCE_ACTION": 1.0,
+            "FENCE_AUTOENABLE": 0.0,
         }
         self.ground_m = ground_m
         self.home_m: Point = (0.0, 0.0, ground_m)
         self.position_m: Point = self.home_m
         self.mission = self.missions(self)
+        self.fence = FakeFence(self, as_int=self.fence_as_int)
         self._buffer: list[bytes] = []
         self._parser = mavlink.MAVLink(None)
         self._parser.robust_parsing = True
@@ -142,6 +153,7 @@ class FakeCopter:
         """Begin anew, where the vehicle is."""
         self.on_at_s = now_s
         self.mode = self.boot_mode
+        self.fence.is_on = False
         self.armed = False
         self.armed_at_s = 0.0
         self.airborne = self.position_m[2] > self.ground_m + 0.1
@@ -233,7 +245,8 @@ class FakeCopter:
             self.heard.append(message)
             if getattr(message, "target_system", self.system_id) != self.system_id:
                 continue
-            handler = self._handlers.get(message.get_type())
+            fence = getattr(message, "mission_type", 0) == FENCE
+            handler = self.fence.on if fence else self._handlers.get(message.get_type())
             if handler is not None and not self.silent:
                 handler(message)
         return self._flush()
@@ -276,6 +289,8 @@ class FakeCopter:
                 self.speed_m_s = m.param2
             case 192:
                 return self._reposition(m)
+            case 207:
+                return ACCEPTED if self.fence.switch(m) else FAILED
             case _:
                 return UNSUPPORTED
         return ACCEPTED

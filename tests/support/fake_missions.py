@@ -262,7 +262,7 @@ class Px4Missions(CopterMissions):
 
     def on_count(self, m: Any) -> None:
         self._heard_s = self.copter.now_s
-        if self._sending is not None or self._wanted:
+        if self._sending is not None or self._wanted or self.copter.fence.busy:
             self.ack(ERROR)
             return
         self._staged = []

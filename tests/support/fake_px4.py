@@ -54,6 +54,8 @@ class FakePx4(FakeCopter):
         {"NAV_DLL_ACT", "COM_DLL_EXCEPT", "COM_DL_LOSS_T", "COM_LOW_BAT_ACT", "SWARM_SIMULATED"}
     )
     limit_names = frozenset({"MPC_ACC_HOR", "MPC_JERK_AUTO", "MPC_TILTMAX_AIR", "MPC_XY_VEL_MAX"})
+    fence_names = frozenset({"GF_ACTION"})
+    fence_as_int = True
     jerk_names = ("MPC_JERK_AUTO",)
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
@@ -72,6 +74,7 @@ class FakePx4(FakeCopter):
             "COM_DLL_EXCEPT": 0.0,
             "COM_DL_LOSS_T": 30.0,
             "COM_LOW_BAT_ACT": 3.0,
+            "GF_ACTION": 2.0,
         }
 
     def power_on(self, now_s: float) -> None:

@@ -18,6 +18,7 @@ from agent.vehicle.firmware.kinematics import (
     Kinematics,
     arducopter_kinematics,
 )
+from agent.vehicle.firmware.fences import ARDUCOPTER_FENCE_NAMES, FenceSetup, arducopter_fence
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware, SpeedParameter
 from agent.vehicle.messages import (
     BatteryStatus,
@@ -93,6 +94,7 @@ class ArduCopter(Firmware):
     """WP_SPD [m/s] since 4.8, WPNAV_SPEED [cm/s] before."""
     failsafe_names = ARDUCOPTER_NAMES
     limit_parameters = ARDUCOPTER_LIMITS
+    fence_names = ARDUCOPTER_FENCE_NAMES
     streams = (
         (1, SystemStatus),
         (193, EkfStatus),
@@ -150,6 +152,10 @@ class ArduCopter(Firmware):
     def kinematics(self, values: Mapping[str, float]) -> Kinematics:
         """As it flies to targets, in missions too."""
         return arducopter_kinematics(values)
+
+    def fence_setup(self, values: Mapping[str, float]) -> FenceSetup:
+        """Polygons are heeded where they are switched on."""
+        return arducopter_fence(values)
 
     def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
         """ArduCopter reads the height as above home."""

@@ -14,6 +14,7 @@ from typing import ClassVar
 from agent.vehicle.commands import result_text
 from agent.vehicle.firmware.failsafes import Failsafes
 from agent.vehicle.firmware.kinematics import Kinematics, LimitParameter
+from agent.vehicle.firmware.fences import POLYGONS, FenceSetup
 from agent.vehicle.messages import (
     AltitudeFrame,
     CommandInt,
@@ -37,6 +38,7 @@ _STATE_STANDBY = 3
 _CMD_DO_SET_MODE = 176
 _CMD_DO_CHANGE_SPEED = 178
 _CMD_DO_REPOSITION = 192
+_CMD_DO_FENCE_ENABLE = 207
 _CMD_COMPONENT_ARM_DISARM = 400
 _CUSTOM_MODE_ENABLED = 1.0
 _GROUND_SPEED = 1.0
@@ -84,6 +86,8 @@ class Firmware(ABC):
     """Parameters that say what it does without us, each by all its names."""
     limit_parameters: ClassVar[tuple[LimitParameter, ...]]
     """Parameters that say how it flies its legs, under every name that they have had."""
+    fence_names: ClassVar[tuple[str, ...]]
+    """Parameters that say what it does about its own fence."""
     streams: ClassVar[tuple[tuple[int, type[Inbound]], ...]]
     """Message ids to ask for beside the position, and what each becomes."""
     mission_vehicle_items: ClassVar[int]
@@ -178,7 +182,22 @@ class Firmware(ABC):
     def kinematics(self, values: Mapping[str, float]) -> Kinematics:
         """How it flies its legs, as far as these parameters say."""
 
+    @abstractmethod
+    def fence_setup(self, values: Mapping[str, float]) -> FenceSetup:
+        """What the vehicle does about a fence, as far as these parameters say."""
+
+    def disowns_fence(self, text: str) -> bool:
+        """Whether the text says that a fence that stands on the vehicle is not heeded."""
+        del text
+        return False
+
     # What it is told.
+
+    def switch_polygons(self, *, on: bool) -> CommandLong:
+        """Heed the polygons of its fence, or do not, until it is switched off."""
+        return CommandLong(
+            _CMD_DO_FENCE_ENABLE, (float(on), float(POLYGONS), 0.0, 0.0, 0.0, 0.0, 0.0)
+        )
 
     def set_commanded_mode(self) -> CommandLong:
         """Switch to the mode that takes our targets."""

@@ -15,6 +15,7 @@ from types import MappingProxyType
 
 from agent.vehicle.firmware.failsafes import PX4_NAMES, Failsafes, px4_failsafes
 from agent.vehicle.firmware.kinematics import PX4_LIMITS, Kinematics, px4_kinematics
+from agent.vehicle.firmware.fences import PX4_FENCE_NAMES, FenceSetup, px4_fence
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware, Mode, SpeedParameter
 from agent.vehicle.messages import (
     CommandLong,
@@ -34,6 +35,7 @@ _RTL, _LAND, _PRECLAND = (_AUTO, 5), (_AUTO, 6), (_AUTO, 9)
 
 _STATE_CRITICAL, _STATE_EMERGENCY = 5, 6
 _OUTSIDE_FENCE = "outside geofence"
+_FENCE_IGNORED = "geofence invalid"
 _CMD_NAV_TAKEOFF = 22
 _CMD_DO_SET_MODE = 176
 _CMD_DO_REPOSITION = 192
@@ -92,6 +94,7 @@ class Px4Copter(Firmware):
     target is; agent.vehicle.firmware.kinematics has the formula."""
     failsafe_names = PX4_NAMES
     limit_parameters = PX4_LIMITS
+    fence_names = PX4_FENCE_NAMES
     streams = ((1, SystemStatus), (230, EkfStatus), (245, ExtendedState))
     """What comes too seldom unasked. EKF_STATUS_REPORT does not exist, and MISSION_CURRENT streams
     by itself: asked for either, PX4 answers "failed"."""
@@ -152,6 +155,14 @@ class Px4Copter(Firmware):
     def kinematics(self, values: Mapping[str, float]) -> Kinematics:
         """As it flies to targets and by missions."""
         return px4_kinematics(values)
+
+    def fence_setup(self, values: Mapping[str, float]) -> FenceSetup:
+        """Polygons are heeded wherever anything is done about fences."""
+        return px4_fence(values)
+
+    def disowns_fence(self, text: str) -> bool:
+        """A polygon that leaves out its home, or the place where it flies when it is put on it."""
+        return _FENCE_IGNORED in text.lower()
 
     def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
         """PX4 reads the height as above sea level; NaN is its own yaw and place."""
