@@ -22,6 +22,8 @@ from sim.world.motion import Point
 
 _FORCE_ARM = 21196.0
 _FORCE_REBOOT = 20190226.0
+_POLYGONS = 4.0
+"""Of DO_FENCE_ENABLE: fences of that kind."""
 
 _ACCEPTED = int(mavlink.MAV_RESULT_ACCEPTED)
 _DENIED = int(mavlink.MAV_RESULT_DENIED)
@@ -138,6 +140,8 @@ class CommandExecutor:
                 return self._send(int(asked), sender, now_s) if math.isfinite(asked) else _DENIED
             case mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES:
                 return self._send(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, sender, now_s)
+            case mavlink.MAV_CMD_DO_FENCE_ENABLE if pilot.flavour.fence_behaviour.switchable:
+                return self._switch_fence(command)
             case mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN:
                 return self._reboot(command)
             case _:
@@ -181,6 +185,13 @@ class CommandExecutor:
             return _DENIED
         custom_mode = self._pilot.flavour.mode_commanded(command.params[1], command.params[2])
         return self._set_custom_mode(custom_mode, now_s)
+
+    def _switch_fence(self, command: AutopilotCommand) -> int:
+        """Polygons alone, or all kinds of fences; of others it is not told apart."""
+        on, kinds = command.params[:2]
+        if on not in (0.0, 1.0) or kinds not in (0.0, _POLYGONS):
+            return _FAILED
+        return _ACCEPTED if self._pilot.fence.switch(on=bool(on)) else _FAILED
 
     def _arm_disarm(self, command: AutopilotCommand, now_s: float) -> int:
         forced = command.params[1] == _FORCE_ARM

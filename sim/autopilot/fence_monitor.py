@@ -34,6 +34,8 @@ class FenceMonitor:
         self._check_s: float | None = None
         self.breached = False
         """The vehicle is where the fence does not allow it to be."""
+        self.switched: bool | None = None
+        """By command, since power-up; None: neither on nor off."""
         self._breaches = 0
         self._acted_in: FlightMode | None = None
         """The mode that it entered for that; None: it did nothing."""
@@ -55,7 +57,8 @@ class FenceMonitor:
     def allows(self, place_enu_m: Point) -> bool:
         """Whether the fence, if it is on, lets the vehicle be there."""
         behaviour = self._pilot.flavour.fence_behaviour
-        if not self._store.fence.areas or not self._pilot.flavour.fence_on(self._pilot.parameters):
+        on = self._pilot.flavour.fence_on(self._pilot.parameters, self.switched)
+        if not (self._store.fence.areas and on):
             return True
         added = behaviour.inclusions_add
         if behaviour.needs_home_inside:
@@ -69,6 +72,13 @@ class FenceMonitor:
         radius_m = self._pilot.flavour.fence_radius_m(self._pilot.parameters)
         away_m = math.dist(target_enu_m[:2], self._pilot.flight.home_enu_m[:2])
         return not 0.0 < radius_m < away_m and self.allows(target_enu_m)
+
+    def switch(self, *, on: bool) -> bool:
+        """Heed it from now on, or not; whether there is one."""
+        if on and not self._store.fence.areas:
+            return False
+        self.switched = on
+        return True
 
     def uploaded(self, now_s: float) -> None:
         """Hear that there is another fence."""

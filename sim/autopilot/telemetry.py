@@ -149,7 +149,7 @@ class TelemetryReporter:
         lost = _GPS if pilot.readiness.gps_lost else 0
         lost |= _BATTERY if pilot.battery.level > ChargeLevel.FINE else 0
         lost |= _FENCE if pilot.fence.breached else 0
-        fenced = _FENCE if pilot.parameters.value("FENCE_ENABLE") else 0
+        fenced = _FENCE if pilot.parameters.value("FENCE_ENABLE") or pilot.fence.switched else 0
         return mavlink.MAVLink_sys_status_message(
             *(present, enabled | fenced, healthy & ~lost, 0),
             *self._measured(now_s),

@@ -372,6 +372,7 @@ class FakeCopter:
         duration_s, self.now_s = now_s - self.now_s, now_s
         self._move(duration_s)
         self.mission.advance()
+        self.fence.advance()
         if self.armed and not self.airborne and now_s - self.armed_at_s > _AUTO_DISARM_S:
             self.armed = False
         if now_s >= self._heartbeat_due_s:

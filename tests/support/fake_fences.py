@@ -47,8 +47,12 @@ class FakeFence:
             if as_int
             else mavlink.MAVLink_mission_request_message
         )
+        self._ask_again_s, self._patience_s = (0.25, 5.0) if as_int else (1.0, 8.0)
+        self._silently = as_int
+        """Whether an upload that is cut off ends without a word of the protocol."""
         self._staged: list[Corner] | None = None
         self._count = 0
+        self._asked_s = self._heard_s = 0.0
 
     @property
     def busy(self) -> bool:
@@ -63,6 +67,7 @@ class FakeFence:
         match m.get_type():
             case "MISSION_COUNT":
                 self._staged, self._count = [], m.count
+                self._heard_s = self.copter.now_s
                 self._ask()
             case "MISSION_ITEM_INT":
                 self._take(m)
@@ -78,6 +83,16 @@ class FakeFence:
                 self._staged = None
             case _:
                 pass
+
+    def advance(self) -> None:
+        """Ask again, or give up."""
+        now_s = self.copter.now_s
+        if self._staged is not None and now_s - self._heard_s > self._patience_s:
+            self._staged = None
+            if not self._silently:
+                self._ack(CANCELLED)
+        elif self._staged is not None and now_s - self._asked_s > self._ask_again_s:
+            self._ask()
 
     def switch(self, m: Any) -> bool:
         """DO_FENCE_ENABLE, of polygons alone; whether it is obeyed."""
@@ -104,6 +119,7 @@ class FakeFence:
             self._ack(ERROR if self._staged is None else INVALID_SEQUENCE)
             return
         assert m.frame in (0, 5), "a place on the globe"
+        self._heard_s = self.copter.now_s
         self._staged.append((m.command, m.param1, m.x, m.y))
         if len(self._staged) < self._count:
             self._ask()
@@ -117,7 +133,7 @@ class FakeFence:
         self._ack(OK)
 
     def _ask(self) -> None:
-        seq = len(self._staged or ())
+        seq, self._asked_s = len(self._staged or ()), self.copter.now_s
         self.copter.say(self._ask_for(*_GROUND, seq, FENCE))
 
     def _told(self, seq: int) -> Any:

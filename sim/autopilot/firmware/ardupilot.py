@@ -196,7 +196,9 @@ class ArduCopterModel(FirmwareModel):
         ground_regained=TextTemplate(_WARNING, "GCS Failsafe Cleared"),
         critical_when_disarmed=True,
     )
-    fence_behaviour = FenceBehaviour("Vehicle breaching Polygon fence", tells_status=True)
+    fence_behaviour = FenceBehaviour(
+        "Vehicle breaching Polygon fence", tells_status=True, switchable=True
+    )
     disarm_delay_after_landing = ParameterRole.DISARM_DELAY_S
     jerk_cost_s = staticmethod(arducopter_jerk_s)
     disarms_at_once = frozenset({FlightMode.RTL, FlightMode.LAND})
@@ -264,6 +266,7 @@ class ArduCopterModel(FirmwareModel):
             ParameterEntry("FENCE_TYPE", 7.0, _INT8),
             ParameterEntry("FENCE_RADIUS", 300.0, _REAL, least=30.0),
             ParameterEntry("FENCE_ACTION", 1.0, _INT8, least=0.0),
+            ParameterEntry("FENCE_AUTOENABLE", 0.0, _INT8, least=0.0),
             ParameterEntry("FENCE_MARGIN", 2.0, _REAL, least=0.0),
             ParameterEntry("FENCE_OPTIONS", 0.0, _INT16, least=0.0),
             ParameterEntry("FENCE_TOTAL", 0.0, _INT8, read_only=True),
@@ -293,10 +296,11 @@ class ArduCopterModel(FirmwareModel):
         on = parameters.value("FENCE_ENABLE") and circle
         return parameters.value("FENCE_RADIUS") if on else 0.0
 
-    def fence_on(self, parameters: ParameterTable) -> bool:
-        """Where fences are on, and polygons among them."""
+    def fence_on(self, parameters: ParameterTable, switched: bool | None) -> bool:
+        """Where polygons are on, by parameter or by command, and may be."""
         polygon = int(parameters.value("FENCE_TYPE")) & _FENCE_POLYGON
-        return bool(parameters.value("FENCE_ENABLE") and polygon)
+        on = parameters.value("FENCE_ENABLE") if switched is None else switched
+        return bool(on and polygon)
 
     def fence_mode(self, parameters: ParameterTable) -> FlightMode | None:
         """It returns, through the fence if need be."""

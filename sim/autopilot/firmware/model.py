@@ -147,6 +147,8 @@ class FenceBehaviour:
     """Whether a fence that keeps the vehicle out of its home is no fence."""
     tells_status: bool = False
     """Whether FENCE_STATUS is said."""
+    switchable: bool = False
+    """Whether it is switched on and off by command, until the next start."""
     critical: bool = False
     """Whether the heartbeat says CRITICAL until somebody changes the mode that was entered, and
     checks fail in flight too."""
@@ -298,8 +300,8 @@ class FirmwareModel(ABC):
         """Radius of the vehicle's own fence around home [m]; 0: it has none."""
 
     @abstractmethod
-    def fence_on(self, parameters: ParameterTable) -> bool:
-        """Whether an uploaded fence counts."""
+    def fence_on(self, parameters: ParameterTable, switched: bool | None) -> bool:
+        """Whether an uploaded fence counts; ``switched`` by command, or None."""
 
     @abstractmethod
     def fence_mode(self, parameters: ParameterTable) -> FlightMode | None:

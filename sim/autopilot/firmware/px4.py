@@ -320,8 +320,9 @@ class Px4Model(FirmwareModel):
         """A circle, unless it is 0."""
         return parameters.value("GF_MAX_HOR_DIST")
 
-    def fence_on(self, parameters: ParameterTable) -> bool:
-        """Unless nothing is done about it."""
+    def fence_on(self, parameters: ParameterTable, switched: bool | None) -> bool:
+        """Unless nothing is done about it; there is no switch."""
+        del switched
         return parameters.value("GF_ACTION") > 0.0
 
     def fence_mode(self, parameters: ParameterTable) -> FlightMode | None:
