@@ -66,11 +66,11 @@ def fence_areas(zone: Zone, origin: Origin) -> tuple[FenceArea, ...]:
         rings = [(_INCLUSION, zone.polygon_enu_m)]
         rings += [(_EXCLUSION, hole) for hole in zone.holes_enu_m]
     elif zone.holes_enu_m:
-        rings = [(_EXCLUSION, tuple(piece.exterior.coords[:-1])) for piece in _cut(zone.shape())]
+        rings = [(_EXCLUSION, _ring(piece)) for piece in _cut(zone.shape())]
     else:
         rings = [(_EXCLUSION, zone.polygon_enu_m)]
     return tuple(
-        FenceArea(command, tuple(_corner_e7((at[0], at[1]), origin) for at in ring))
+        FenceArea(command, tuple(_corner_e7(corner_m, origin) for corner_m in ring))
         for command, ring in rings
     )
 
@@ -119,6 +119,11 @@ def _told_e7(item: MissionItem) -> Corner:
 def _corner_e7(place_enu_m: tuple[float, float], origin: Origin) -> Corner:
     lat_deg, lon_deg, _ = wgs84_from_enu(origin, (*place_enu_m, 0.0))
     return round(lat_deg * _DEG_E7), round(((lon_deg + 180.0) % 360.0 - 180.0) * _DEG_E7)
+
+
+def _ring(shape: shapely.Polygon) -> tuple[tuple[float, float], ...]:
+    """Its corners, each once."""
+    return tuple((east_m, north_m) for east_m, north_m in shape.exterior.coords[:-1])
 
 
 def _cut(shape: shapely.Polygon) -> Iterator[shapely.Polygon]:

@@ -336,8 +336,7 @@ def return_home(activity: Activity, order: Return, session: VehicleSession) -> A
         motors_asked = isinstance(activity, Preparing) and activity.in_our_hands
         if commanded and (heartbeat.armed or motors_asked):
             session.send("disarm", firmware.disarm())
-        elif session.fence is not None and session.fence.stands:
-            return Returning(session, firmware, order)  # it stands; its fence is taken off first
+        session.take_fence_off()  # begins at once, and ends if there is time for it
         session.report(Home())
         return Idle(session)
     if session.silent:

@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -112,6 +112,8 @@ class OnboardFence:
         """What stands on the vehicle, verified; None if that is not known."""
         self._sent: tuple[FenceArea, ...] | None = None
         """What the transfer under way is to leave there; None while it only reads."""
+        self._stale = False
+        """What may stand there holds a zone that is none any more."""
         self._ours = False
         """What stands on the vehicle is ours, or nothing: it may be replaced."""
         self._asked_on = self._is_on = False
@@ -136,10 +138,12 @@ class OnboardFence:
         origin = self._conversation.config.origin
         self._zones = {zone: Obstacles([zone], _CLEAR_M) for zone in zones}
         for zone in zones:
-            self._known += [
-                area for area in fence_areas(zone, origin) if not _is_among(area, self._known)
-            ]
-        self._want([zone for zone in self._included if zone in zones])
+            self._known += [a for a in fence_areas(zone, origin) if a not in self._known]
+        kept = [zone for zone in self._included if zone in zones]
+        if len(kept) < len(self._included):
+            self._stale = True
+            self.interrupt()
+        self._want(kept)
 
     def advance(self, place_enu_m: Point | None, home_up_m: float, *, may_begin: bool) -> None:
         """Put on the vehicle what it should have.
@@ -245,15 +249,7 @@ class OnboardFence:
         if self._without is not None or not (self._wanted or self._ours):
             return True
         wants_on = self._setup.switches and bool(self._wanted)
-        return self._is_held and self._is_on is wants_on
-
-    @property
-    def _is_held(self) -> bool:
-        """Whether what is wanted stands on the vehicle, and nothing else."""
-        held, wanted = self._held, self._wanted
-        if held is None or len(held) != len(wanted):
-            return False
-        return all(a.is_same(b) for a, b in zip(held, wanted, strict=True))
+        return self._held == self._wanted and self._is_on is wants_on
 
     @property
     def _setup(self) -> FenceSetup:
@@ -279,7 +275,7 @@ class OnboardFence:
         pending = [zone for zone in self._pending if blocks_all_heights(zone, *heights_m)]
         self._pending = tuple(pending)
         zones = [*self._included, *pending]
-        if self._is_held or self._transfer.busy:
+        if self._held == self._wanted or self._transfer.busy:
             kept, new = self._included, pending
         else:
             kept, new = (), zones
@@ -304,7 +300,7 @@ class OnboardFence:
         elif not self._ours:
             self._sent = None
             self._conversation.say(*self._transfer.read(range(1, _MOST_ITEMS), now_s))
-        elif self._held is None or not self._is_held:
+        elif self._held != self._wanted:
             self._put()
         elif not self._conversation.commands.pending(_TAG):
             self._asked_on = not self._is_on
@@ -325,8 +321,8 @@ class OnboardFence:
     def _put(self) -> None:
         """Clear what is to go, and put on the rest."""
         now_s, held = self._conversation.now_s, self._held or ()
-        stale = any(not _is_among(area, self._wanted) for area in held)
-        self._sent = () if stale else self._wanted
+        self._stale |= any(area not in self._wanted for area in held)
+        self._sent = () if self._stale else self._wanted
         if self._sent:
             self._conversation.say(*self._transfer.upload(fence_items(self._sent), now_s))
         else:
@@ -341,7 +337,8 @@ class OnboardFence:
             case MissionRead(count, items):
                 self._on_read(count, areas_of(items) if items or not count else None)
             case MissionInForce():
-                self._held, self._failures, self._failure = self._sent, 0, None
+                self._held, self._stale = self._sent, False
+                self._failures, self._failure = 0, None
             case MissionFailed(unsupported=True) if not self._ours:
                 self._without = "its firmware takes no fence"
             case MissionFailed(reason):
@@ -350,8 +347,10 @@ class OnboardFence:
 
     def _on_read(self, count: int, areas: tuple[FenceArea, ...] | None) -> None:
         """What stands on the vehicle is ours, or is left there."""
-        if areas is not None and all(_is_among(area, self._known) for area in areas):
-            self._ours, self._held = True, areas
+        held = [next(filter(area.is_same, self._known), None) for area in areas or ()]
+        known = tuple(area for area in held if area is not None)
+        if areas is not None and len(known) == len(areas):
+            self._ours, self._held = True, known
         else:
             points = f"{count} item{'s' if count != 1 else ''}"
             self._without = f"it has a fence of its own ({points}), which is left as it is"
@@ -367,7 +366,3 @@ class OnboardFence:
     def _forget_transfer(self) -> None:
         self._transfer.result = None
         self._held = None
-
-
-def _is_among(area: FenceArea, areas: Iterable[FenceArea]) -> bool:
-    return any(area.is_same(other) for other in areas)

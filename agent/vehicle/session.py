@@ -215,7 +215,12 @@ class VehicleSession(Conversation):
 
     def take_fence_off(self) -> bool:
         """Leave no fence of ours on a vehicle that has landed; whether that is over."""
-        return self.fence is None or self.fence.take_off()
+        if self.fence is None:
+            return True
+        over = self.fence.take_off()
+        if over:
+            self.tell_caution("fence", self.fence.caution)
+        return over
 
     def abort_fence(self) -> None:
         """Say nothing more of its fence."""

@@ -149,7 +149,7 @@ def test_a_link_that_dies_in_the_middle_of_an_upload_leaves_the_old_fence(
         sent += sum(message.get_type() == "MISSION_ITEM_INT" for message in messages)
         return [] if sent > 2 else messages
 
-    flight.codec.decode = cut  # type: ignore[method-assign,assignment]
+    flight.codec.decode = cut  # type: ignore[method-assign]
     flight.to_bridge(KeepOut((WALL, FIELD), 3.0))
     flight.wait(20.0)
     assert corners_on(flight) == 4

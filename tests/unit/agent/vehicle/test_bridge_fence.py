@@ -24,7 +24,14 @@ from agent.core.interface import (
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.fence_items import fence_areas
 from swarm.model import Zone, ZoneId
-from tests.support.bridge_flight import ORIGIN, START, BridgeFlight, rough_link
+from tests.support.bridge_flight import (
+    ORIGIN,
+    START,
+    BridgeFlight,
+    Spoil,
+    rough_link,
+    untouched,
+)
 from tests.support.fake_copter import SWITCH_FENCE, FakeCopter
 from tests.support.fake_fences import EXCLUSION, FENCE, INCLUSION, Corner
 from tests.support.fake_px4 import FakePx4
@@ -59,13 +66,13 @@ def flight_of(
     fake: type[FakeCopter],
     *zones: Zone,
     style: CommandStyle = CommandStyle.REPOSITION,
-    **links: Callable[[bytes], list[bytes]],
+    link: Callable[[int], Spoil] = lambda _: untouched,
 ) -> BridgeFlight:
     """A flight that has not begun, with these zones from the beginning."""
     config = BridgeConfig(
         1, ORIGIN, command=style, zones=zones, zone_margin_m=3.0, position_rate_hz=10.0
     )
-    return BridgeFlight(fake(ORIGIN), config, **links)
+    return BridgeFlight(fake(ORIGIN), config, to_vehicle=link(0), to_bridge=link(1))
 
 
 def corners_of(*zones: Zone) -> list[Corner]:
@@ -343,8 +350,7 @@ def test_what_the_vehicle_says_of_its_fence_is_told() -> None:
 def test_a_rough_link_only_takes_longer(
     fake: type[FakeCopter], style: CommandStyle, seed: int
 ) -> None:
-    spoilt = {"to_vehicle": rough_link(seed), "to_bridge": rough_link(seed + 10)}
-    flight = flight_of(fake, FIELD, WALL, style=style, **spoilt)
+    flight = flight_of(fake, FIELD, WALL, style=style, link=lambda way: rough_link(seed + 10 * way))
     flight.order(START)
     flight.run_until(VehicleReady(), limit_s=240.0)
     flight.order(KeepOut((WALL, FAR), 3.0))
