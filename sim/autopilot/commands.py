@@ -141,7 +141,7 @@ class CommandExecutor:
             case mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES:
                 return self._send(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, sender, now_s)
             case mavlink.MAV_CMD_DO_FENCE_ENABLE if pilot.flavour.fence_behaviour.switchable:
-                return self._switch_fence(command)
+                return self._switch_fence(command, now_s)
             case mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN:
                 return self._reboot(command)
             case _:
@@ -186,12 +186,12 @@ class CommandExecutor:
         custom_mode = self._pilot.flavour.mode_commanded(command.params[1], command.params[2])
         return self._set_custom_mode(custom_mode, now_s)
 
-    def _switch_fence(self, command: AutopilotCommand) -> int:
+    def _switch_fence(self, command: AutopilotCommand, now_s: float) -> int:
         """Polygons alone, or all kinds of fences; of others it is not told apart."""
         on, kinds = command.params[:2]
         if on not in (0.0, 1.0) or kinds not in (0.0, _POLYGONS):
             return _FAILED
-        return _ACCEPTED if self._pilot.fence.switch(on=bool(on)) else _FAILED
+        return _ACCEPTED if self._pilot.fence.switch(now_s, on=bool(on)) else _FAILED
 
     def _arm_disarm(self, command: AutopilotCommand, now_s: float) -> int:
         forced = command.params[1] == _FORCE_ARM

@@ -73,11 +73,12 @@ class FenceMonitor:
         away_m = math.dist(target_enu_m[:2], self._pilot.flight.home_enu_m[:2])
         return not 0.0 < radius_m < away_m and self.allows(target_enu_m)
 
-    def switch(self, *, on: bool) -> bool:
+    def switch(self, now_s: float, *, on: bool) -> bool:
         """Heed it from now on, or not; whether there is one."""
         if on and not self._store.fence.areas:
             return False
         self.switched = on
+        self._look(now_s, acts=self._pilot.armed and not self._pilot.flight.on_ground)
         return True
 
     def uploaded(self, now_s: float) -> None:

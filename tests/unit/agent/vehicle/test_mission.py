@@ -17,6 +17,7 @@ from agent.vehicle.messages import (
     MissionClearAll,
     MissionCount,
     MissionItem,
+    MissionKind,
     MissionRequest,
     MissionRequestList,
     Outbound,
@@ -226,6 +227,50 @@ def test_first_mission_that_fails_on_a_bad_link_leaves_none_or_says_so(seed: int
         assert tuple(store.items[1:]) == NEW[1:]
     elif result.old_mission_verified:
         assert store.items in ([], list(OLD))
+
+
+def test_what_stands_on_the_vehicle_is_cleared_on_request() -> None:
+    machine, store = MissionTransfer(MissionPolicy()), FakeStore()
+    transfer(machine, store, OLD)
+    [clears] = machine.clear(0.0)
+    [acknowledged] = store.on_message(clears, 0.0)
+    [asks] = machine.on_message(acknowledged, 0.0)
+    assert machine.busy  # that it is clear is still to be seen
+    [counted] = store.on_message(asks, 0.0)
+    machine.on_message(counted, 0.0)
+    assert machine.result == MissionInForce(())
+    assert machine.in_force is None
+    assert store.items == []
+
+
+def test_clearing_that_is_not_answered_is_given_up_in_the_end() -> None:
+    machine = MissionTransfer(MissionPolicy(tries=2))
+    machine.clear(0.0)
+    for now_s in range(2, 20, 2):
+        machine.on_time(float(now_s))
+    assert machine.result == MissionFailed(
+        "no answer while clearing the mission", old_mission_verified=False
+    )
+
+
+def test_a_fence_is_transferred_apart_from_missions() -> None:
+    fence = MissionKind.FENCE
+    items = tuple(replace(item, kind=fence) for item in NEW)
+    machine = MissionTransfer(MissionPolicy(vehicle_items=0), fence)
+    assert machine.upload(items, 0.0) == [MissionCount(4, fence)]
+    assert machine.on_message(MissionRequest(0), 0.0) == []
+    assert machine.on_message(MissionAck(4), 0.0) == []
+    assert machine.on_message(MissionRequest(0, fence), 0.0) == [items[0]]
+    assert machine.busy
+
+
+def test_a_vehicle_that_knows_no_fences_says_so_at_once() -> None:
+    fence = MissionKind.FENCE
+    machine = MissionTransfer(MissionPolicy(vehicle_items=0), fence)
+    assert machine.read(range(1, 9), 0.0) == [MissionRequestList(fence)]
+    machine.on_message(MissionAck(3, fence), 0.0)
+    assert isinstance(machine.result, MissionFailed)
+    assert machine.result.unsupported
 
 
 def test_acknowledgement_of_an_older_upload_ends_nothing() -> None:

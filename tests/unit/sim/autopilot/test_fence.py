@@ -182,6 +182,28 @@ def test_a_fence_that_is_off_is_heeded_by_nobody() -> None:
     assert only(ground.heard, "HEARTBEAT")[-1].custom_mode == GUIDED
 
 
+def test_arducopter_is_switched_on_and_off_by_command() -> None:
+    ground = ground_station()
+    ground.wait(5.0)
+    switch = (mavlink.MAV_CMD_DO_FENCE_ENABLE, 1, 4, 0, 0, 0, 0, 0)
+    assert ground.command(*switch) == mavlink.MAV_RESULT_FAILED  # there is none
+
+    assert upload(ground, corners((OUTSIDE, HERE))) == ACCEPTED
+    assert ground.arm() == ACCEPTED
+    ground.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 0, 0, 0, 0, 0, 0)
+    assert ground.command(*switch) == ACCEPTED
+    assert ground.arm() != ACCEPTED
+    assert ground.command(*switch[:1], 0, *switch[2:]) == ACCEPTED
+    assert ground.arm() == ACCEPTED
+
+
+def test_px4_knows_no_switch_of_its_fence() -> None:
+    ground = ground_station(Px4Model())
+    ground.wait(5.0)
+    switched = ground.command(mavlink.MAV_CMD_DO_FENCE_ENABLE, 1, 4, 0, 0, 0, 0, 0)
+    assert switched == mavlink.MAV_RESULT_UNSUPPORTED
+
+
 def test_px4_ignores_targets_beyond_and_holds_where_it_breaks_the_fence() -> None:
     ground = flying_px4((INSIDE, FIELD), (OUTSIDE, VILLAGE))
     fly_px4(ground, 50.0)
