@@ -494,6 +494,9 @@ class BridgeWatch:
                 self._task = replace(self._task, leg=None)
             case Refused(order) if order is self._ordered:
                 self._task = self._task_before  # it changes nothing
+            case Refused() if self.bridge.phase is FlightPhase.STANDING:
+                # It did not leave, and stands there by the same order still.
+                self._task = replace(self._task, leg=self._base_leg)
             case Refused():
                 self._task = replace(self._task, leg=None)
             case Telemetry(position, velocity, battery_frac):

@@ -65,6 +65,21 @@ def changed(flight: BridgeFlight, silent_s: float = 8.0) -> None:
     flight.run(12.0)
 
 
+def test_one_above_the_agents_fence_comes_down_into_it_before_it_flies_to_its_base(
+    fake: type[FakeCopter], config: BridgeConfig
+) -> None:
+    flight = BridgeFlight(fake(ORIGIN), replace(config, fence_height_m=60.0)).prepared()
+    flight.copter.position_m = (20.0, 0.0, 66.0)
+    flight.copter.target_m = None
+    flight.run(2.0)
+    flight.copter.heard.clear()
+    flight.order(SWAP)
+    flight.run_until(Landed(3))
+    heights_m = [told.z - ORIGIN.alt_m for told in flight.copter.commands(REPOSITION)]
+    assert heights_m
+    assert max(heights_m) < 60.0
+
+
 def test_it_lands_waits_for_word_and_battery_and_flies_on(
     fake: type[FakeCopter], config: BridgeConfig
 ) -> None:
