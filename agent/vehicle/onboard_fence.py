@@ -228,10 +228,11 @@ class OnboardFence:
             self._forget_transfer()
 
     def abort(self) -> None:
-        """Say nothing more, because link or vehicle are somebody else's."""
+        """Say nothing more, because the vehicle is somebody else's, and perhaps its fence, too."""
         if self._transfer.busy:
             self._transfer.abort("it is not ours any more")
-            self._forget_transfer()
+        self._forget_transfer()
+        self._ours = False
 
     def next_deadline_s(self) -> float | None:
         """When there is something to do, beside what follows from news."""

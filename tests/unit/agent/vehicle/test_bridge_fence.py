@@ -284,6 +284,24 @@ def test_it_stands_on_a_vehicle_that_its_pilot_has_taken(fake: type[FakeCopter])
     assert len(fence_words(flight)) == heard
 
 
+def test_a_fence_that_its_pilot_has_changed_meanwhile_is_left_as_it_is(
+    fake: type[FakeCopter],
+) -> None:
+    flight = flight_of(fake, WALL).flying(east_m=10.0)
+    flight.copter.set_mode(flight.copter.pilot_mode)
+    flight.run_until(HandedOver)
+    theirs = corners_of(WALL, AROUND)
+    flight.copter.fence.items = list(theirs)
+    flight.copter.set_mode(flight.copter.own_mode)
+    flight.order(Prepare(START.position_enu_m, START.speed_m_s, resume=True))
+    flight.run_until(VehicleReady())
+    flight.order(KeepOut((FAR,), 3.0))
+    flight.order(Return("over"))
+    flight.run_until(Home())
+    assert flight.copter.fence.items == theirs
+    assert "a fence of its own (8 items)" in flight.cautions[-1]
+
+
 def test_a_vehicle_that_is_taken_in_the_middle_of_an_upload_hears_no_more_of_it(
     fake: type[FakeCopter],
 ) -> None:
