@@ -82,7 +82,8 @@ SUCCESSORS: Final[dict[FlightPhase, frozenset[FlightPhase]]] = {
     ),
 }
 """What may follow which within one step: nothing is flown to that was not prepared, and a
-vehicle that was handed over is neither sent anywhere nor stopped."""
+vehicle that was handed over is neither sent anywhere nor stopped. One that an earlier life left in
+the air hovers if the landing that it is found for is refused at once."""
 
 
 def follow(activity: Activity, session: VehicleSession) -> Activity:

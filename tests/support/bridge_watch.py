@@ -496,7 +496,7 @@ class BridgeWatch:
                 self._task = self._task_before  # it changes nothing
             case Refused() if self.bridge.phase is FlightPhase.STANDING:
                 # It did not leave, and stands there by the same order still.
-                self._task = replace(self._task, leg=self._base_leg)
+                self._task = replace(self._task, leg=self._swap_leg)
             case Refused():
                 self._task = replace(self._task, leg=None)
             case Telemetry(position, velocity, battery_frac):
