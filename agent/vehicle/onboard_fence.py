@@ -120,6 +120,8 @@ class OnboardFence:
         """Whether we have switched it on: asked for, and acknowledged."""
         self._failures = 0
         self._next_at_s = -math.inf
+        self._driven_s = -math.inf
+        """When it was last carried on with."""
         self._without: str | None = None
         """Why there will be none of ours; None as long as there may."""
         self._failure: str | None = None
@@ -235,7 +237,9 @@ class OnboardFence:
         self._ours = False
 
     def next_deadline_s(self) -> float | None:
-        """When there is something to do, beside what follows from news."""
+        """When there is something to do, beside what follows from news; None also at a rest."""
+        if self._driven_s < self._conversation.now_s:
+            return None
         if self._transfer.busy:
             return self._transfer.next_deadline_s()
         if self._is_settled:
@@ -286,7 +290,7 @@ class OnboardFence:
             self._pending = tuple(zone for zone in zones if zone not in wanted)
 
     def _carry_on(self, *, may_begin: bool) -> None:
-        now_s = self._conversation.now_s
+        now_s = self._driven_s = self._conversation.now_s
         self._conversation.say(*self._transfer.on_time(now_s))
         self._settle()
         if self._ours and not self._wanted and self._held == () and not self._is_on:

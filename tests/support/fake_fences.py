@@ -34,6 +34,8 @@ class FakeFence:
         self.copter = copter
         self.items: list[Corner] = []
         self.supported = True
+        self.mute = False
+        """It says nothing to anything about fences."""
         self.garbles = False
         """It tells another place than it was told."""
         self.takes = 1_000
@@ -61,6 +63,8 @@ class FakeFence:
 
     def on(self, m: Any) -> None:
         """One message of the mission protocol that concerns fences."""
+        if self.mute:
+            return
         if not self.supported:
             self._ack(UNSUPPORTED)
             return

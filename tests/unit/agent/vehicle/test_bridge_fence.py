@@ -188,6 +188,23 @@ def test_a_zone_drawn_over_it_is_put_there_once_it_is_outside(fake: type[FakeCop
     assert flight.cautions == []
 
 
+def test_a_transfer_rests_while_something_else_keeps_it_on_the_ground(
+    fake: type[FakeCopter],
+) -> None:
+    flight = flight_of(fake, WALL)
+    flight.copter.fence.mute = True
+    flight.order(START)
+    while not fence_words(flight):
+        flight.step()
+    flight.copter.prearm_ok = False
+    for _ in range(200):
+        flight.step()
+        assert flight.bridge.next_deadline_s() > flight.now_s
+    flight.copter.prearm_ok, flight.copter.fence.mute = True, False
+    flight.run_until(VehicleReady(), limit_s=120.0)
+    assert flight.copter.fence.items == corners_of(WALL)
+
+
 @pytest.mark.parametrize("takes", [0, 1, 3])
 def test_an_upload_cut_in_the_middle_leaves_the_old_fence_and_is_tried_again(
     fake: type[FakeCopter], takes: int
@@ -237,6 +254,16 @@ def test_firmware_without_fences_is_flown_all_the_same(
     assert flight.cautions == ["its firmware takes no fence: only its agent keeps it out of zones"]
     flight.order(Return("over"))
     flight.run_until(Home())
+
+
+def test_firmware_that_says_nothing_of_fences_is_flown_after_three_tries(
+    fake: type[FakeCopter],
+) -> None:
+    flight = flight_of(fake, WALL)
+    flight.copter.fence.mute = True
+    flight.order(START)
+    flight.run_until(VehicleReady(), limit_s=60.0)
+    assert "no answer while asking for the count" in flight.cautions[-1]
 
 
 @pytest.mark.parametrize("kind", [EXCLUSION, 5003], ids=["polygon", "circle"])
