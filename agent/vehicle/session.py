@@ -208,9 +208,10 @@ class VehicleSession(Conversation):
         fence, position = self.fence, self.vehicle.position
         if fence is None:
             return None
-        home_m = 0.0 if position is None else position.alt_m - position.relative_alt_m
+        home_alt_m = 0.0 if position is None else position.alt_m - position.relative_alt_m
         free = self.mission is None or not self.mission.is_transferring
-        fence.advance(self.known_place_m(), home_m - self.config.origin.alt_m, may_begin=free)
+        home_up_m = home_alt_m - self.config.origin.alt_m
+        fence.advance(self.known_place_m(), home_up_m, may_begin=free)
         return fence.objection
 
     def take_fence_off(self) -> bool:
