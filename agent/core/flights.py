@@ -118,7 +118,7 @@ class Flights(AgentPart):
     def land_s(self) -> float:
         """How long it takes from above a base until it has landed, as predictions have it [s]."""
         problem = self.problem
-        return 0.0 if problem is None else problem.land_s(self._row(problem), 0)
+        return 0.0 if problem is None else problem.landing_s(self._row(problem), 0)
 
     @property
     def climb_s(self) -> float:

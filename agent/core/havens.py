@@ -125,7 +125,8 @@ class Havens(AgentPart):
         claims.pop(me, None)
         blocked = sum(where == base.id for where in self._visits.blocking().values())
         free = base.slots - blocked
-        return bases.lands_s(base.id, free, base.swap_s, claims, arrives_s, mission_s)
+        land_s = self._flights.land_s
+        return bases.lands_s(base.id, free, base.swap_s, claims, arrives_s, mission_s, land_s)
 
     def _way_to(self, name: str) -> field.Way | None:
         here = self._mission_view.place_enu_m, id(self._flights.problem)

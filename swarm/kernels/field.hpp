@@ -49,6 +49,7 @@ struct FieldProblem {
     const double* survival;           // (n_uav, n_task)
     const std::uint8_t* capable;      // (n_uav, n_task) p > 0
     const double* full_s;             // (n_uav,) airborne time of a sortie after a swap
+    const double* land_s;             // (n_uav,) of the times of legs to bases, the landing
     const double* swap_s;             // (n_base,)
     const std::int32_t* slots;        // (n_base,); 0: no limit
 
@@ -120,9 +121,15 @@ inline Refusal do_task(const FieldProblem& problem, int uav, Item item, Progress
     return Refusal::kNone;
 }
 
-// When `uav` would arrive above a base; infinity: there is no way.
+// When `uav` would stand at a base where a slot is free; infinity: there is no way.
 inline double arrival_s(const FieldProblem& problem, int base, const Progress& progress) {
     return progress.time_s + progress.legs_s[problem.base_node(base)];
+}
+
+// When `uav`, whose leg to a base would end on its ground at `arrive_s`, touches down there if a slot
+// is free from `slot_s` on: it waits for that in the air, before it lands.
+inline double touch_down_s(const FieldProblem& problem, int uav, double arrive_s, double slot_s) {
+    return std::max(arrive_s, slot_s + problem.land_s[uav]);
 }
 
 // Let `uav`, which departs at once, land at `base` at `begin_s`, when there is a slot for it, or say

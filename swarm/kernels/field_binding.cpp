@@ -49,6 +49,7 @@ void require_shapes(const BoundField& given) {
     require_shape("due_s", given.due_s, {n_task});
     require_shape("weight", given.weight, {n_uav, n_task});
     require_shape("survival", given.survival, {n_uav, n_task});
+    require_shape("land_s", given.land_s, {n_uav});
     require_shape("slots", given.slots, {n_base});
 }
 
@@ -71,6 +72,7 @@ void require_right(const BoundField& given, const In<bool, 2>& capable, double h
     require_numbers("weight", given.weight, 0.0, kMost, ">= 0 and finite");
     require_numbers("survival", given.survival, 0.0, 1.0, "within 0..1");
     require_numbers("full_s", given.full_s, 0.0, kEndless, times);
+    require_numbers("land_s", given.land_s, 0.0, kMost, ">= 0 and finite");
     require_numbers("swap_s", given.swap_s, 0.0, kMost, ">= 0 and finite");
     require_numbers("slots", given.slots, 0, kMostSlots, ">= 0");
     require_within("horizon_s", horizon_s, kLeast, kMost, "> 0 and finite");
@@ -117,6 +119,7 @@ void prepare(BoundField& given, double horizon_s) {
     problem.survival = given.survival.data();
     problem.capable = given.capable.data();
     problem.full_s = given.full_s.data();
+    problem.land_s = given.land_s.data();
     problem.swap_s = given.swap_s.data();
     problem.slots = given.slots.data();
 }
@@ -177,7 +180,8 @@ void bind_field(nb::module_& module) {
                In<std::int32_t, 2> home, In<double, 1> service_s, In<double, 1> opens_s,
                In<double, 1> closes_s, In<double, 1> due_s, In<double, 2> weight,
                In<double, 2> survival, In<bool, 2> capable, In<double, 1> full_s,
-               In<double, 1> swap_s, In<std::int32_t, 1> slots, double horizon_s) {
+               In<double, 1> land_s, In<double, 1> swap_s, In<std::int32_t, 1> slots,
+               double horizon_s) {
                 BoundField given;
                 given.kind = kind;
                 given.leg_s = leg_s;
@@ -192,6 +196,7 @@ void bind_field(nb::module_& module) {
                 given.weight = weight;
                 given.survival = survival;
                 given.full_s = full_s;
+                given.land_s = land_s;
                 given.swap_s = swap_s;
                 given.slots = slots;
                 require_right(given, capable, horizon_s);
@@ -206,7 +211,8 @@ void bind_field(nb::module_& module) {
             nb::arg("closes_s").noconvert(), nb::arg("due_s").noconvert(),
             nb::arg("weight").noconvert(), nb::arg("survival").noconvert(),
             nb::arg("capable").noconvert(), nb::arg("full_s").noconvert(),
-            nb::arg("swap_s").noconvert(), nb::arg("slots").noconvert(), nb::arg("horizon_s"))
+            nb::arg("land_s").noconvert(), nb::arg("swap_s").noconvert(),
+            nb::arg("slots").noconvert(), nb::arg("horizon_s"))
         .def_prop_ro("until_s",
                      [](nb::handle self) {
                          const auto& given = nb::cast<const BoundField&>(self);

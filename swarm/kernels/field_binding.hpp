@@ -19,7 +19,7 @@ struct BoundField {
     In<std::int32_t, 2> home;
     In<double, 1> service_s, opens_s, closes_s, due_s;
     In<double, 2> weight, survival;
-    In<double, 1> full_s, swap_s;
+    In<double, 1> full_s, land_s, swap_s;
     In<std::int32_t, 1> slots;
     std::vector<double> until_s;                         // what follows from them
     std::vector<std::uint8_t> is_line, required, capable;

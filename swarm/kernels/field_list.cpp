@@ -75,18 +75,20 @@ double earliest_s(const FieldList& list, std::size_t count) {
 
 double Stays::begin_s(int base, int uav, double arrive_s) const {
     const std::vector<Held>& held = at_[base];
+    const double land_s = problem_->land_s[uav];
     const Arrival own{arrive_s, team_->rank[uav], uav};
     auto end = std::lower_bound(held.begin(), held.end(), own, [](const Held& a, const Arrival& b) {
         return a.arrival < b;
     });
     leaves_s_.clear();
-    while (end != held.begin() && (--end)->latest_s > arrive_s) {
-        if (end->leave_s > arrive_s && end->arrival.uav != uav) leaves_s_.push_back(end->leave_s);
+    while (end != held.begin() && (--end)->latest_s + land_s > arrive_s) {
+        if (end->leave_s + land_s > arrive_s && end->arrival.uav != uav)
+            leaves_s_.push_back(end->leave_s);
     }
     const std::size_t slots = static_cast<std::size_t>(problem_->slots[base]);
     if (leaves_s_.size() < slots) return arrive_s;
     std::sort(leaves_s_.begin(), leaves_s_.end());
-    return leaves_s_[leaves_s_.size() - slots];
+    return touch_down_s(*problem_, uav, arrive_s, leaves_s_[leaves_s_.size() - slots]);
 }
 
 void Stays::set(int uav, const std::vector<Stay>& stays) {

@@ -31,9 +31,7 @@ double score_of(FieldRule rule, const Progress& before, double weight, double un
 }  // namespace
 
 void BaseTraffic::reset(const FieldProblem& problem, const FieldTeam& team) {
-    at_.assign(problem.n_uav, At{});
-    held_.assign(problem.n_base, 0);
-    limit_.assign(problem.n_base, 0);
+    clear(problem);
     for (int base = 0; base < problem.n_base; ++base) {
         const int slots = problem.slots[base];
         if (slots < problem.n_uav) limit_[base] = slots;  // more are as good as no limit
@@ -52,10 +50,12 @@ void BaseTraffic::reset(const FieldProblem& problem, const FieldTeam& team) {
     }
 }
 
-void BaseTraffic::reset(const FieldProblem& problem) {
+void BaseTraffic::clear(const FieldProblem& problem) {
     at_.assign(problem.n_uav, At{});
     held_.assign(problem.n_base, 0);
     limit_.assign(problem.n_base, 0);
+    left_s_.resize(problem.n_base);
+    for (std::vector<double>& left_s : left_s_) left_s.clear();
 }
 
 void BaseTraffic::approach(int uav, int base, const Arrival& arrival, double sortie_end_s) {
@@ -69,12 +69,30 @@ void BaseTraffic::hold(int uav, int base, double until_s) {
 
 void BaseTraffic::leave(int uav) {
     --held_[at_[uav].base];
+    left_s_[at_[uav].base].push_back(at_[uav].until_s);
     at_[uav].stage = Stage::kElsewhere;
+}
+
+// Since when slots of a base are free: who comes takes the one that is so for longest, so those that
+// are free now were left last, or never held.
+void BaseTraffic::find_free(int base) {
+    const std::vector<double>& left_s = left_s_[base];
+    const std::ptrdiff_t n_free = std::max(0, limit_[base] - held_[base]);
+    const std::ptrdiff_t n_left = std::min(n_free, static_cast<std::ptrdiff_t>(left_s.size()));
+    slot_s_.assign(n_free, -kNever);
+    std::copy(left_s.end() - n_left, left_s.end(), slot_s_.begin());
+}
+
+double BaseTraffic::lands_s(const FieldProblem& problem, int uav) {
+    find_free(at_[uav].base);
+    const double slot_s = *std::min_element(slot_s_.begin(), slot_s_.end());
+    return touch_down_s(problem, uav, at_[uav].arrival.arrive_s, slot_s);
 }
 
 double BaseTraffic::begin_s(const FieldProblem& problem, int base, const Arrival& arrival) {
     if (!limited(base)) return arrival.arrive_s;
-    slot_s_.assign(limit_[base], -kNever);
+    find_free(base);
+    slot_s_.resize(limit_[base], -kNever);  // of those that are held it is told below
     const auto slot = [&]() -> double& {
         return *std::min_element(slot_s_.begin(), slot_s_.end());
     };
@@ -93,10 +111,10 @@ double BaseTraffic::begin_s(const FieldProblem& problem, int base, const Arrival
               [&](int a, int b) { return at_[a].arrival < at_[b].arrival; });
     for (const int uav : ahead_) {
         double& slot_s = slot();
-        const double begin_s = std::max(at_[uav].arrival.arrive_s, slot_s);
+        const double begin_s = touch_down_s(problem, uav, at_[uav].arrival.arrive_s, slot_s);
         if (begin_s <= at_[uav].sortie_end_s + kToleranceS) slot_s = begin_s + problem.swap_s[base];
     }
-    return std::max(arrival.arrive_s, slot());
+    return touch_down_s(problem, arrival.uav, arrival.arrive_s, slot());
 }
 
 FieldChoice FieldDecider::decide(FieldRule rule, const FieldView& view, BaseTraffic& traffic,
@@ -160,7 +178,7 @@ const OwnPlan& FieldDecider::own_list(const FieldView& view, bool may_swap) {
 // What greedy would do next and next, alone.
 std::vector<Item> FieldDecider::greedy_list(const FieldView& view, bool may_swap) {
     const FieldProblem& problem = view.problem;
-    nobody_.reset(problem);
+    nobody_.clear(problem);
     std::vector<Item> list;
     std::vector<int> open = view.open;
     Progress progress = view.progress;
@@ -385,7 +403,7 @@ void FieldRun::once(const FieldProblem& problem, const FieldTeam& team, FieldRul
         } else {
             const int base = uavs_[event.uav].base;
             if (traffic_.any_free(base)) {
-                touch_down(problem, event.uav, event.time_s);
+                touch_down(problem, event.uav, traffic_.lands_s(problem, event.uav));
             } else {
                 waiting_[base].push_back(event.uav);
             }
@@ -465,13 +483,12 @@ void FieldRun::touch_down(const FieldProblem& problem, int uav, double begin_s) 
 
 void FieldRun::release(const FieldProblem& problem, int uav) {
     const int base = traffic_.base_of_holder(uav);
-    const double now_s = traffic_.until_s(uav);
     traffic_.leave(uav);
     std::vector<int>& waiting = waiting_[base];
     while (!waiting.empty() && traffic_.any_free(base)) {
         const int next = waiting.front();
         waiting.erase(waiting.begin());
-        touch_down(problem, next, now_s);
+        touch_down(problem, next, traffic_.lands_s(problem, next));
     }
 }
 

@@ -32,7 +32,7 @@ struct FieldChoice {
 class BaseTraffic {
  public:
     void reset(const FieldProblem& problem, const FieldTeam& team);
-    void reset(const FieldProblem& problem);  // every slot is free, always
+    void clear(const FieldProblem& problem);  // every slot is free, always
     bool limited(int base) const { return limit_[base] > 0; }
     bool any_free(int base) const { return held_[base] < limit_[base]; }
 
@@ -43,7 +43,9 @@ class BaseTraffic {
     void leave(int uav);  // of a holder
     bool holds(int uav) const { return at_[uav].stage == Stage::kHolding; }
     int base_of_holder(int uav) const { return at_[uav].base; }
-    double until_s(int uav) const { return at_[uav].until_s; }
+
+    // When who is on the way to a base touches down, if it takes a slot that is free now.
+    double lands_s(const FieldProblem& problem, int uav);
 
     // When there would be a slot for who arrives like that: those ahead that are known stay no
     // longer than their swap takes.
@@ -59,8 +61,11 @@ class BaseTraffic {
         double sortie_end_s = 0.0;
     };
 
+    void find_free(int base);
+
     std::vector<At> at_;             // (n_uav,)
     std::vector<int> limit_, held_;  // (n_base,); limit 0: none
+    std::vector<std::vector<double>> left_s_;  // (n_base,) when slots were left, in that order
     std::vector<double> slot_s_;
     std::vector<int> ahead_;
 };

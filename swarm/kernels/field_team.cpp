@@ -148,7 +148,7 @@ bool TeamFlights::serve(const FieldProblem& problem, const FieldTeam& team, cons
     const bool bound = bound_[arrival.uav];
     const int base = bound ? team.landed_at[arrival.uav] : base_of(list.items[flight.done]);
     double& slot_s = slots_.earliest(base);
-    const double begin_s = std::max(arrival.arrive_s, slot_s);
+    const double begin_s = touch_down_s(problem, arrival.uav, arrival.arrive_s, slot_s);
     Times landing{};
     Times& times = bound ? landing : times_[first_[arrival.uav] + flight.done];
     const Refusal refusal = begin_s < kNever ? swap_battery(problem, arrival.uav, base, begin_s,

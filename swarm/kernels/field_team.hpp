@@ -29,7 +29,7 @@ struct FieldFlight {
     double value() const { return progress.value; }
 };
 
-// An arrival above a base with slots; the earlier one is served first.
+// An arrival at a base with slots, landed if one is free; the earlier one is served first.
 struct Arrival {
     double arrive_s;
     std::int64_t rank;

@@ -123,18 +123,22 @@ def lands_s(
     claims: Mapping[str, Claim],
     arrives_s: float,
     now_s: float,
+    land_s: float = 0.0,
 ) -> float:
-    """When somebody who arrives at ``base`` then finds a slot [s]; infinite where there is none.
+    """When somebody who arrives at ``base`` then stands on a slot [s]; infinite where none is.
 
-    Whoever is there, or said that it arrives no later, lands first, each as soon as it can.
+    Whoever is there, or said that it arrives no later, lands first, each as soon as it can: who is
+    in the air waits there for its slot, and lands then.
 
     Args:
         base: where.
         free: slots on which nobody stands who is lost.
         swap_s: how long a swap takes there [s].
         claims: those of credible others.
-        arrives_s: when it is above the base [s mission time].
+        arrives_s: when it would stand there if a slot were free [s mission time].
         now_s: nobody leaves a slot before [s mission time].
+        land_s: how long it takes from above the base to the ground; others are taken to be as
+            quick [s].
     """
     if free <= 0:
         return math.inf
@@ -146,11 +150,13 @@ def lands_s(
     ]
     slots_s = sorted(left_s)[-free:] + [now_s] * (free - len(left_s))
     heapq.heapify(slots_s)
-    queue = sorted(arrival_order(uav, claim) for uav, claim in here if _queues(claim))
-    for comes_s, _, _ in queue:
+    queue = [(*arrival_order(uav, claim), claim) for uav, claim in here if _queues(claim)]
+    queue.sort(key=lambda each: each[:3])
+    for comes_s, _, _, claim in queue:
         if comes_s <= arrives_s:
-            heapq.heapreplace(slots_s, max(slots_s[0], comes_s) + swap_s)
-    return max(slots_s[0], arrives_s)
+            down_s = 0.0 if wants_slot(claim) else land_s
+            heapq.heapreplace(slots_s, max(slots_s[0] + down_s, comes_s) + swap_s)
+    return max(slots_s[0] + land_s, arrives_s)
 
 
 def _queues(claim: Claim) -> bool:

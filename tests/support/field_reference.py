@@ -157,7 +157,7 @@ class PlainField:
             base = -1 - items[len(one.times)]
             begin_s = arrive_s
             if base in slots:
-                begin_s = max(begin_s, min(slots[base]))
+                begin_s = max(begin_s, min(slots[base]) + float(problem.land_s[uav]))
             step = self.swap(uav, one.stand, base, begin_s)
             if isinstance(step, FieldRefusal) or math.isinf(begin_s):
                 one.refusal = FieldRefusal.ENERGY

@@ -7,6 +7,13 @@ import random
 from swarm.allocation.field import FieldProblem, FieldState
 
 
+def with_landings(rng: random.Random, problem: FieldProblem) -> FieldProblem:
+    """The same where each UAV takes a time of its own to land, and to climb again."""
+    as_briefed = [1.0] * problem.n_uav
+    land_s, climb_s = ([rng.uniform(0.5, 4.0) for _ in as_briefed] for _ in range(2))
+    return problem.calibrated(as_briefed, as_briefed, land_s, climb_s)
+
+
 def random_state(rng: random.Random, problem: FieldProblem) -> FieldState:
     """In mid-mission: some fly somewhere, some stand at bases, some are out of it."""
     n_uav = problem.n_uav

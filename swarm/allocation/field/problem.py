@@ -39,6 +39,7 @@ _ARRAYS: Mapping[str, tuple[type[np.generic], int]] = {
     "survival": (np.float64, 2),
     "capable": (np.bool_, 2),
     "full_s": (np.float64, 1),
+    "land_s": (np.float64, 1),
     "swap_s": (np.float64, 1),
     "slots": (np.int32, 1),
 }
@@ -92,6 +93,9 @@ class FieldProblem:
     """(n_uav,) airborne time of the sortie that begins at mission time 0 [s]; may be below 0."""
     full_s: FloatArray
     """(n_uav,) the same after a swap [s]."""
+    land_s: FloatArray
+    """(n_uav,) of the times of legs to bases and starts, the landing: a slot is waited for before
+    it [s]."""
     swap_s: FloatArray
     """(n_base,) from touch-down to ready [s]."""
     slots: IntArray
@@ -181,6 +185,7 @@ class FieldProblem:
             capable=success > 0.0,
             first_s=_floats(_airborne_s(uav, uav.charge_frac) for uav in rows),
             full_s=_floats(_airborne_s(uav, 1.0) for uav in rows),
+            land_s=network.land_s,
             swap_s=_floats(base.swap_s for base in mission.bases),
             slots=np.array([base.slots or 0 for base in mission.bases], dtype=np.int32),
             network=network,
@@ -216,13 +221,13 @@ class FieldProblem:
             home_s=network.home_s,
             first_s=self.first_s / drain - aloft_s,
             full_s=self.full_s / drain,
+            land_s=network.land_s,
             network=network,
         )
 
-    def land_s(self, uav: int, node: int) -> float:
+    def landing_s(self, uav: int, node: int) -> float:
         """Of the time of a leg to ``node``, its landing [s]."""
-        at_home = node < self.n_uav + self.n_base
-        return float(self.network.land_s[uav]) if at_home and self.network is not None else 0.0
+        return float(self.land_s[uav]) if node < self.n_uav + self.n_base else 0.0
 
     @property
     def n_uav(self) -> int:

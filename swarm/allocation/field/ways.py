@@ -62,7 +62,7 @@ def way_to(problem: FieldProblem, uav: int, place_enu_m: Sequence[float], node: 
         duration_s=duration_s,
         via_enu_m=tuple(points[1:-1]),
         end_enu_m=points[-1],
-        upright_s=problem.land_s(uav, node),
+        upright_s=problem.landing_s(uav, node),
     )
 
 

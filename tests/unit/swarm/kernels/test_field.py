@@ -21,7 +21,7 @@ from tests.support.field_oracle.scenario import read
 from tests.support.field_oracle.schedule import Swap, Work
 from tests.support.field_oracle.slots import fly_all
 from tests.support.field_reference import Flown, PlainField, greedy_base, greedy_step
-from tests.support.field_states import random_state
+from tests.support.field_states import random_state, with_landings
 from tests.support.seeds import seeds, sweeps
 
 LISTS = 6
@@ -108,12 +108,14 @@ def test_schedules_are_those_of_plain_loops_and_of_the_oracle(kind: str, sweep: 
                     assert flight.entries[-1].arrive_s == pytest.approx(one.home_s[1], abs=close)
 
 
+@pytest.mark.parametrize("lands", [False, True])
 @pytest.mark.parametrize("kind", ["slots", "energy", "windows", "all"])
-def test_schedules_from_mid_mission_are_those_of_plain_loops(kind: str) -> None:
+def test_schedules_from_mid_mission_are_those_of_plain_loops(kind: str, lands: bool) -> None:
     waits = 0
     for seed in range(20):
         rng = random.Random(f"mid-{seed}")
         problem = problem_of(made_up(seed, kind, n_uavs=4, n_tasks=6))
+        problem = with_landings(rng, problem) if lands else problem
         for _ in range(LISTS):
             state, lists = random_state(rng, problem), random_lists(rng, problem)
             flown = field.fly_lists(problem.kernel, state, lists)
@@ -133,6 +135,32 @@ def test_of_two_arrivals_at_one_instant_the_sequence_decides() -> None:
         begins_s = flown.times_s[[0, 2], 2]
         assert begins_s[first] == 10.0
         assert begins_s[1 - first] == 10.0 + 30.0
+
+
+def test_who_waits_for_a_slot_lands_after_it_has_waited() -> None:
+    problem, _ = twins([0, 1])
+    problem = problem.calibrated([1.0, 1.0], [1.0, 1.0], [4.0, 7.0], [3.0, 3.0])
+
+    flown = field.fly_lists(problem.kernel, FieldState.at_start(problem), [[-1, 0], [-1, 2]])
+
+    assert flown.feasible
+    assert flown.times_s[0].tolist() == [0.0, 14.0, 14.0, 44.0]
+    # The slot is free when the other one takes off to climb; its own landing comes after that.
+    assert flown.times_s[2].tolist() == [0.0, 17.0, 44.0 + 7.0, 44.0 + 7.0 + 30.0]
+
+
+def test_who_comes_while_a_slot_becomes_free_lands_no_later_than_it_must() -> None:
+    """It is above the base just before the slot is free, and on the ground long after that."""
+    problem, state = twins([0, 1])
+    problem = problem.calibrated([1.0, 1.0], [1.0, 1.0], [4.0, 7.0])
+    state = FieldState.at_start(problem)
+    state.landed_at[0] = 0
+    state.free_s[0] = 12.0
+    state.first_s[0] = problem.leg_s[problem.kind[0], problem.n_uav]
+
+    flown = field.fly_lists(problem.kernel, state, [[0], [-1, 2]])
+
+    assert flown.times_s[1].tolist() == [0.0, 17.0, 12.0 + 7.0, 12.0 + 7.0 + 30.0]
 
 
 def test_who_waits_on_the_ground_keeps_the_slot() -> None:
@@ -176,10 +204,11 @@ def test_greedy_takes_what_plain_loops_take(kind: str, sweep: range) -> None:
 @pytest.mark.parametrize("seed", seeds(10, 300))
 def test_greedy_reckons_with_waits_for_slots_as_plain_loops_do(seed: int) -> None:
     """Who is known to be ahead at a base stays there for its swap, or until it is to depart."""
+    rng = random.Random(f"landings-{seed}")
     for draft in (crowd(seed), dilemma(seed, 4, 8, slots=True)):
-        problem = problem_of(draft)
-        check_greedy(problem, FieldState.at_start(problem))
-        check_greedy(problem, random_state(random.Random(seed), problem))
+        for problem in (problem_of(draft), with_landings(rng, problem_of(draft))):
+            check_greedy(problem, FieldState.at_start(problem))
+            check_greedy(problem, random_state(random.Random(seed), problem))
 
 
 def test_waits_for_slots_that_greedy_reckons_with_are_many() -> None:

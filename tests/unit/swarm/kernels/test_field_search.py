@@ -14,6 +14,7 @@ from swarm.kernels.field_search import optimise_lists
 from tests.support.field_dilemmas import dilemma
 from tests.support.field_missions import mission_of
 from tests.support.field_oracle.made_up import made_up
+from tests.support.field_states import with_landings
 
 
 @pytest.fixture(scope="module")
@@ -82,10 +83,12 @@ def some_landed(problem: FieldProblem, rng: random.Random) -> FieldState:
     return state
 
 
+@pytest.mark.parametrize("lands", [False, True])
 @pytest.mark.parametrize("seed", range(25))
-def test_lists_heed_who_stands_at_bases_and_has_none(seed: int) -> None:
+def test_lists_heed_who_stands_at_bases_and_has_none(seed: int, lands: bool) -> None:
     draft = dilemma(seed, n_uavs=3, n_tasks=8, slots=True)
     problem = FieldProblem.from_mission(mission_of(draft).known_at_start())
+    problem = with_landings(random.Random(seed), problem) if lands else problem
     state = some_landed(problem, random.Random(seed))
 
     found = optimise_lists(problem.kernel, state, seed=seed, iterations=400, threads=1)

@@ -104,11 +104,11 @@ def test_legs_that_end_or_begin_on_the_ground_take_longer_by_landing_and_climbin
     np.testing.assert_array_equal(after.home_s[1], before.home_s[1] * 1.25 + 20.0)
     here = after.legs_from_s(1, (3.0, 4.0, 0.0)) - 1.25 * before.legs_from_s(1, (3.0, 4.0, 0.0))
     np.testing.assert_allclose(here, [20.0, 20.0, 20.0, 0.0, 0.0], atol=1e-9)
-    assert after.land_s(1, base) == 20.0
+    assert after.landing_s(1, base) == 20.0
     # All are in the air, and wait there, while the last one climbs.
     np.testing.assert_array_equal(after.first_s, before.first_s - 7.0)
     np.testing.assert_array_equal(after.full_s, before.full_s)
-    assert after.land_s(1, near) == after.land_s(0, base) == 0.0
+    assert after.landing_s(1, near) == after.landing_s(0, base) == 0.0
     way = way_to(after, 1, (3.0, 4.0, 0.0), base)
     assert way is not None
     assert way.upright_s == 20.0
