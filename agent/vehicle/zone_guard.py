@@ -27,6 +27,10 @@ _ASIDE_M = 1.0
 """So much nearer than the margin a way that is ordered may come: nothing hovers quite where it
 was told. The bends at its corners are the bridge's own choice, and keep all of it."""
 
+_BEND_M = 0.5
+"""So much farther than the margin bends stay away where that can be chosen: no vehicle keeps
+to them quite. Ways are led farther out where there is room (agent.core.path_clearance)."""
+
 _STEP_M = 0.5
 """Places are looked at that far apart on a way out."""
 
@@ -47,7 +51,7 @@ class ZoneGuard:
             from swarm.allocation.legs.obstacles import Obstacles
         near_m = max(0.0, margin_m - _ASIDE_M)
         self._zones = [(zone, Obstacles([zone], near_m)) for zone in zones]
-        self._margins = [(zone, Obstacles([zone], margin_m)) for zone in zones]
+        self._margins = [(zone, Obstacles([zone], margin_m + _BEND_M)) for zone in zones]
 
     def __bool__(self) -> bool:
         return bool(self._zones)
@@ -69,7 +73,7 @@ class ZoneGuard:
         return None
 
     def clear(self, path_enu_m: Sequence[Point]) -> bool:
-        """Whether no piece of that path meets a zone, or its margin."""
+        """Whether no piece of that path meets a zone or its margin, nor comes near to it."""
         if not self._zones:
             return True
         places_m = np.array([place[:2] for place in path_enu_m])
