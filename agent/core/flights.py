@@ -265,8 +265,9 @@ class Flights(AgentPart):
         self.meter.depart(self.leg, flown_s / self._time_frac())
         name = None if task is None else task.task
         via_enu_m = way.via_enu_m
+        trigger_m = None if task is None or task.trigger_m is None else 0.0  # along the line only
         self._order(
-            GoTo(self.leg, way.end_enu_m, stay_s, idled, name, attempt, via_enu_m=via_enu_m)
+            GoTo(self.leg, way.end_enu_m, stay_s, idled, name, attempt, via_enu_m, trigger_m)
         )
 
     def along_line(self, task: TaskEntry, attempt: int, *, backwards: bool) -> Point:
@@ -276,9 +277,9 @@ class Flights(AgentPart):
         self.leg += 1
         line_s = self.line_s(task.task, backwards=backwards)
         self.meter.depart(self.leg, line_s / self._time_frac())
-        via_enu_m = tuple(flown[1:-1])
-        order = GoTo(self.leg, flown[-1], task.service_s, False, task.task, attempt, via_enu_m)
-        self._order(order)
+        via_enu_m, stay_s = tuple(flown[1:-1]), task.service_s
+        name, trigger_m = task.task, task.trigger_m
+        self._order(GoTo(self.leg, flown[-1], stay_s, False, name, attempt, via_enu_m, trigger_m))
         return points[-1]
 
     def _time_frac(self) -> float:

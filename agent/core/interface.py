@@ -53,6 +53,9 @@ class GoTo:
     via_enu_m: tuple[tuple[float, float, float], ...] = field(default=(), repr=False)
     """Corners to fly through before, in that order and without stopping [m; mission origin,
     height included]. A vehicle on the ground takes off first, straight up."""
+    trigger_m: float | None = field(default=None, repr=False)
+    """How far apart the camera takes pictures on the way [m], 0: it takes none; None: it is no
+    concern, and is left alone."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,6 +59,11 @@ class Activity:
         """Whether it has asked for takeoff."""
         return False
 
+    @property
+    def trigger_m(self) -> float | None:
+        """How far apart its camera takes pictures [m]; None: it takes none, if it has any."""
+        return None
+
     def expects(self, heartbeat: Heartbeat) -> bool:
         """Whether our orders lead to that mode; anything else is somebody else's doing."""
         return self.obeys(heartbeat.custom_mode)

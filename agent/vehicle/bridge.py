@@ -303,6 +303,7 @@ class Bridge:
                 session.mission.on_ended(one)
             if session.fence is not None:
                 session.fence.on_ended(one)
+            session.camera.on_ended(one)
             self._activity.on_ended(one)
             self._settle()
 
@@ -327,6 +328,7 @@ class Bridge:
             self._activity = follow_mission(self._activity, session)
             self._advance_override()
             self._advance_fence()
+            self._advance_camera()
         self._activity.advance()
         self._settle()
 
@@ -348,6 +350,13 @@ class Bridge:
         elif session.vehicle.armed or isinstance(activity, Standing | HandOver):
             session.abort_fence()
         session.tell_caution("fence", session.fence.caution)
+
+    def _advance_camera(self) -> None:
+        """Have pictures taken along lines, and nowhere else; of somebody else's vehicle never."""
+        session, activity = self._session, self._activity
+        if session.firmware is not None and activity.in_our_hands:
+            session.camera.want(activity.trigger_m)
+            session.camera.advance(session.firmware)
 
     def _advance_override(self) -> None:
         """Raise the limit of jerk from its preparation on, until it is told to go home."""

@@ -328,6 +328,11 @@ class Flying(Activity):
             speed_m_s = session.cruise_speed_m_s
             self._leg = reposition_leg(session, firmware, way, speed_m_s, insists=insists)
 
+    @property
+    def trigger_m(self) -> float | None:
+        """As the order has it."""
+        return self._order.trigger_m
+
     def start(self) -> None:
         """Tell the vehicle, in place of whatever it was told before."""
         self._leg.start()

@@ -11,6 +11,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
 
 from agent.core.interface import FlightLimits, VehicleOrder
+from agent.vehicle.camera_control import CameraControl
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.contact import Contact
 from agent.vehicle.conversation import Conversation
@@ -79,6 +80,8 @@ class VehicleSession(Conversation):
         """Zones on the vehicle as its own fence; None as long as it is not known what it is."""
         self.override: ParameterOverride | None = None
         """What is another parameter during a flight; None if nothing is."""
+        self.camera = CameraControl(self)
+        """When it takes pictures."""
         self.cruise_speed_m_s = 0.0
         """Of the last preparation; 0 before the first."""
         self.planned_m_s2: float | None = None
@@ -260,5 +263,6 @@ class VehicleSession(Conversation):
         self.vehicle = VehicleState()
         self.safety = SafetyMonitor(self.config)
         self.position_filter = PositionFilter()
+        self.camera = CameraControl(self)
         self.firmware = self.mission = self.override = self.fence = None
         self.commands.cancel_all()

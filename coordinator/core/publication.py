@@ -132,6 +132,7 @@ def task_entry_of(task: Task, number: int) -> TaskEntry:
         closes_s=task.closes_s,
         path_enu_m=task.path_enu_m,
         height_m=task.height_m,
+        trigger_m=task.trigger_m,
     )
 
 

@@ -136,6 +136,8 @@ class Task:
     path_enu_m: tuple[PointEnu, ...] = ()
     """Points of the line [m; as for the place], flown from one end to the other, whichever way is
     better; empty of a place."""
+    trigger_m: float | None = None
+    """Of a line, how far apart pictures are taken along it [m]; > 0. None: none are."""
     height_m: float | None = None
     """Where it is flown [m above the origin]; None: in the UAV's own layer above the place."""
 
@@ -158,6 +160,8 @@ class Task:
             number = getattr(self, name)
             if number is not None and not (math.isfinite(number) and number >= 0.0):
                 raise ValueError(f"{name} of task {self.id} must be >= 0, not {number}")
+        if self.trigger_m is not None and not (self.path_enu_m and 0.0 < self.trigger_m < math.inf):
+            raise ValueError(f"trigger_m of task {self.id} must be > 0, and along a path")
         if self.height_m is not None and not math.isfinite(self.height_m):
             raise ValueError(f"height_m of task {self.id} must be finite, not {self.height_m}")
 
@@ -231,6 +235,7 @@ class Mission:
             "opens_s": lambda task: task.opens_s > 0.0,
             "closes_s": lambda task: task.closes_s is not None,
             "path_m": lambda task: bool(task.path_enu_m),
+            "trigger_m": lambda task: task.trigger_m is not None,
             "height_m": lambda task: task.height_m is not None,
         }
         found += [key for key, has in of_tasks.items() if any(map(has, self.tasks))]

@@ -171,6 +171,7 @@ def task_of(entry: PostedTask) -> Task:
         closes_s=entry.closes_s,
         path_enu_m=entry.path_enu_m,
         height_m=entry.height_m,
+        trigger_m=entry.trigger_m,
     )
 
 

@@ -68,7 +68,9 @@ FIELDS: Final[dict[type, tuple[str, ...]]] = {
     for part in (*KINDS.values(), UavSpec, BaseSpec, ZoneSpec, ChoiceBasis, Candidate)
 }
 """Of everything that a message is made of."""
-_OF_TASKS: Final = frozenset({"due_s", "opens_s", "closes_s", "path_enu_m", "height_m"})
+_OF_TASKS: Final = frozenset(
+    {"due_s", "opens_s", "closes_s", "path_enu_m", "height_m", "trigger_m"}
+)
 _OF_CLAIMS: Final = ("base", "stage", "arrives_s", "sortie_end_s", "reversed", "departs_s")
 _OF_UAVS: Final = ("airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
 _OF_BRIEFS: Final = ("bases", "zones", "wind_enu_m_s", "zone_margin_m", "band_m")

@@ -178,11 +178,15 @@ class PostedTask(Checked):
     """Points of a line [m; mission origin]; empty of a place."""
     height_m: Metres | None = None
     """Where it is flown [m above the origin]; None: in the UAV's own layer above the place."""
+    trigger_m: Metres | None = None
+    """Of a line, how far apart pictures are taken along it [m]; None: none are."""
 
     def __post_init__(self) -> None:
         path = self.path_enu_m
         if path and (len(path) < 2 or path[0] != self.position_enu_m):
             raise ValueError(f"path of task {self.task} must begin at its position and go on")
+        if self.trigger_m is not None and not (path and self.trigger_m > 0.0):
+            raise ValueError(f"trigger_m of task {self.task} must be > 0, and along a path")
 
 
 @dataclass(frozen=True, slots=True)

@@ -135,6 +135,7 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "path_m": "Instead of position_m: a line flown from one end to the other, whichever way "
         "is better; points as position_m.",
         "path": "The same by latitude and longitude [deg].",
+        "trigger_m": "A picture every so many metres along the line [m]. Absent: none.",
         "height_m": "It is flown that high above the origin [m]. Absent: in the UAV's layer.",
     },
 }
@@ -185,6 +186,7 @@ _EXAMPLES: Mapping[tuple[str, str], str] = {
     ("task", "closes_s"): "240.0",
     ("task", "path_m"): "[[0.0, 60.0], [200.0, 60.0]]",
     ("task", "path"): "[[47.398, 8.546], [47.398, 8.549]]",
+    ("task", "trigger_m"): "20.0",
     ("task", "height_m"): "60.0",
 }
 """Values of fields that may be left out, as they could be."""

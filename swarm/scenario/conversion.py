@@ -101,6 +101,7 @@ def _task(task: TaskTable, origin: Origin | None) -> Task:
         opens_s=task.opens_s,
         closes_s=task.closes_s,
         path_enu_m=line,
+        trigger_m=task.trigger_m,
         height_m=task.height_m,
     )
 

@@ -15,12 +15,12 @@ EDITIONS = (1, 2)
 NEW_KEYS: Mapping[str, Sequence[str]] = {
     "mission": ("wind_m_s", "zone_margin_m", "band_m"),
     "uav": ("acceleration_m_s2", "airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac"),
-    "task": ("due_s", "opens_s", "closes_s", "path_m", "path", "height_m"),
+    "task": ("due_s", "opens_s", "closes_s", "path_m", "path", "trigger_m", "height_m"),
 }
 """What schema 2 adds to the tables of schema 1."""
 NEW_TABLES = ("base", "zone")
 """Tables of schema 2."""
-_LATER_KEYS: Mapping[str, Sequence[str]] = {"mission": ("separation_m",), "task": ("trigger_m",)}
+_LATER_KEYS: Mapping[str, Sequence[str]] = {"mission": ("separation_m",)}
 _LATER_TABLES: Mapping[str, str] = {"area": "[[area]]", "terrain": "[terrain]"}
 
 

@@ -64,6 +64,9 @@ def misplaced(document: Document, name: str, found: Iterable[Entry]) -> Iterator
     frame = origin_of(origin)
     for index, entry in found:
         path: Path = (name, index)
+        if "trigger_m" in entry and not (LINE.metres in entry or LINE.degrees in entry):
+            remedy = f"give {LINE.metres}, or leave it out"
+            yield Finding((*path, "trigger_m"), "is of lines, not of places", remedy)
         if name == "task" and (LINE.metres in entry or LINE.degrees in entry):
             yield from _beside_line(path, entry)
             yield from outline_faults(document, path, entry, LINE)

@@ -173,6 +173,7 @@ class TaskTable(_Placed):
     closes_s: _Seconds | None = None
     path_m: Annotated[list[_Point], AfterValidator(_require_line)] | None = None
     path: Annotated[list[_Degrees], AfterValidator(_require_line)] | None = None
+    trigger_m: Annotated[float, Field(ge=0.1, le=1e6)] | None = None
     height_m: _Metres | None = None
 
 
@@ -259,6 +260,7 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("task", "closes_s"): _SECONDS,
     ("task", "path_m"): "two points or more, [[east, north], …], each within -1e7..1e7 [m]",
     ("task", "path"): "two points or more, [[lat_deg, lon_deg], …]",
+    ("task", "trigger_m"): "a distance within 0.1..1e6 [m]",
     ("task", "height_m"): _HEIGHT,
 } | {
     (table, key): right

@@ -54,7 +54,7 @@ def is_plain(mission: Mission) -> bool:
 
 
 _OF_UAV = ("acceleration_m_s2", "airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
-_OF_TASK = ("due_s", "opens_s", "closes_s", "height_m")
+_OF_TASK = ("due_s", "opens_s", "closes_s", "trigger_m", "height_m")
 
 
 def _given(item: Uav | Task, names: Sequence[str]) -> dict[str, object]:

@@ -37,6 +37,7 @@ _COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
 _STATE_STANDBY = 3
 _CMD_DO_SET_MODE = 176
 _CMD_DO_CHANGE_SPEED = 178
+_CMD_DO_SET_CAM_TRIGG_DIST = 206
 _CMD_DO_REPOSITION = 192
 _CMD_DO_FENCE_ENABLE = 207
 _CMD_COMPONENT_ARM_DISARM = 400
@@ -222,6 +223,12 @@ class Firmware(ABC):
     def disarm(self) -> CommandLong:
         """Stop the motors; refused in the air."""
         return CommandLong(_CMD_COMPONENT_ARM_DISARM, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
+    def trigger_camera(self, distance_m: float) -> CommandLong:
+        """Take a picture now and every so many metres from here; 0: take none any more."""
+        now = float(distance_m > 0.0)
+        params = (distance_m, 0.0, now, 0.0, 0.0, 0.0, 0.0)
+        return CommandLong(_CMD_DO_SET_CAM_TRIGG_DIST, params)
 
     @abstractmethod
     def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:

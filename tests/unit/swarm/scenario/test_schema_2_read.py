@@ -76,6 +76,7 @@ height_m = 60.0
 [[task]]
 id = "t2"
 path_m = [[0.0, 50.0], [90.0, 50.0, 4.0]]
+trigger_m = 20.0
 value = 2.0
 
 [[task]]
@@ -374,16 +375,21 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
         "open_s = 60.0",
         ["task[0] \"t1\".open_s: unknown key; did you mean 'opens_s'?"],
     ),
+    "pictures of a place": (
+        'id = "t1"\n',
+        'id = "t1"\ntrigger_m = 20.0\n',
+        ['task[0] "t1".trigger_m: is of lines, not of places; give path_m, or leave it out'],
+    ),
+    "pictures on the spot": (
+        "trigger_m = 20.0",
+        "trigger_m = 0.0",
+        ['task[1] "t2".trigger_m: 0.0 is not >= 0.1; give a distance within 0.1..1e6 [m]'],
+    ),
     # words of later releases
     "separation": (
         "zone_margin_m = 5",
         "zone_margin_m = 5\nseparation_m = 10.0",
         ["mission.separation_m: this release does not plan by separation_m yet; leave it out"],
-    ),
-    "pictures along a line": (
-        'id = "t2"\n',
-        'id = "t2"\ntrigger_m = 20.0\n',
-        ['task[1] "t2".trigger_m: this release does not plan by trigger_m yet; leave it out'],
     ),
     "area": (
         "[[zone]]\n",
@@ -435,6 +441,7 @@ def test_valid_file_becomes_its_mission() -> None:
     assert (t1.due_s, t1.opens_s, t1.closes_s, t1.height_m) == (300.0, 60.0, 240.0, 60.0)
     assert (t2.due_s, t2.opens_s, t2.closes_s, t2.height_m) == (None, 0.0, None, None)
     assert (t1.path_enu_m, t2.path_enu_m) == ((), ((0.0, 50.0, 0.0), (90.0, 50.0, 4.0)))
+    assert (t1.trigger_m, t2.trigger_m, t3.trigger_m) == (None, 20.0, None)
     assert t2.position_enu_m == (0.0, 50.0, 0.0)
     assert t3.path_enu_m[2] == enu_from_wgs84(origin, 47.004, 8.001, 400.0)
 
@@ -487,9 +494,11 @@ def test_schema_1_with_a_word_of_schema_2_takes_one_line(old: str, new: str, wor
 
 
 def test_words_of_later_releases_are_of_schema_2_too() -> None:
-    assert faults(SCHEMA_1.replace("appears_s = 20.0", "trigger_m = 20.0")) == [
-        "s.toml: schema: is 1, and trigger_m is of schema 2; give schema = 2",
-        's.toml: task[1] "t2".trigger_m: this release does not plan by trigger_m yet; leave it out',
+    text = SCHEMA_1.replace("[mission]\n", "[mission]\nseparation_m = 10.0\n", 1)
+
+    assert faults(text) == [
+        "s.toml: schema: is 1, and separation_m is of schema 2; give schema = 2",
+        *[f"s.toml: {line}" for line in WRONG["separation"][2]],
     ]
 
 
@@ -526,7 +535,8 @@ def test_twelve_faults_take_twelve_lines_in_the_order_of_the_file() -> None:
         ("ceiling_m = 120.0", "ceiling_m = 0.0"),
         ("inclusive = true", 'inclusive = "yes"'),
         ("closes_s = 240.0", "closes_s = nan"),
-        ('id = "t2"\n', 'id = "t2"\ntrigger_m = 1\nposition_m = [0.0, 50.0]\n'),
+        ('id = "t2"\n', 'id = "t2"\nposition_m = [0.0, 50.0]\n'),
+        ("trigger_m = 20.0", "trigger_m = -1"),
     ):
         assert old in text
         text = text.replace(old, new, 1)
@@ -541,6 +551,6 @@ def test_twelve_faults_take_twelve_lines_in_the_order_of_the_file() -> None:
         'zone[0] "village".ceiling_m',
         'zone[1] "county".inclusive',
         'task[0] "t1".closes_s',
-        'task[1] "t2".trigger_m',
         'task[1] "t2".path_m',
+        'task[1] "t2".trigger_m',
     ]

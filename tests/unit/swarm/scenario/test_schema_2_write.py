@@ -216,6 +216,7 @@ height_m = 60.0
 id = "t2"
 path_m = [[0.0, 50.0], [90.0, 50.0, 4.0]]
 value = 2.0
+trigger_m = 20.0
 
 [[task]]
 id = "t3"
