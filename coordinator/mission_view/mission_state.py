@@ -16,6 +16,7 @@ from coordinator.mission_view.fleet_reports import FleetReports
 from coordinator.mission_view.flown_mission import FlownMission
 from coordinator.mission_view.narrator import MissionNarrator
 from coordinator.mission_view.observed_flights import ObservedFlights
+from coordinator.mission_view.observed_limits import ObservedLimits
 from coordinator.mission_view.pace import PacedClock
 from coordinator.mission_view.results import MissionResult
 from coordinator.mission_view.story import EventKind, MissionEvent
@@ -47,6 +48,7 @@ from swarm.protocol.messages import (
     Snapshot,
     TaskEdit,
 )
+from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.sync import QuestionTimer
 from swarm.protocol.timing import StallDetector, Timing, earliest
@@ -81,6 +83,8 @@ class MissionState:
         self._timing = timing
         self.flights = ObservedFlights()
         """Where UAVs went, as far as they have told."""
+        self.limits = ObservedLimits()
+        """How near they came to zones and to the end of their batteries, likewise."""
         self._ways: FleetWays | None = None
         self._flown = FlownMission(mission, self.board)
         self._reports = FleetReports(self.replica)
@@ -292,7 +296,10 @@ class MissionState:
             reborn = self._reports.take_status(writer, message.stamp, message.body)
             if reborn is not None:
                 self._narrator.status(writer, message.body, before, now_s, reborn=reborn)
-                self.flights.hear_status(writer, message.body, *self._layer_and_grounds(writer))
+                layer_m, grounds = self._layer_and_grounds(writer)
+                self.flights.hear_status(writer, message.body, layer_m, grounds)
+                zones = zones_in_force(self.replica)
+                self.limits.hear(writer, message.body, layer_m, zones)
             return
         if isinstance(message.body, Choice):
             if self._reports.take_choice(writer, message.stamp, message.body):

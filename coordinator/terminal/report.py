@@ -75,6 +75,10 @@ class MissionReport:
     """Where UAVs really went, and when, as far as that is known."""
     closest_approach_m: float | None = None
     """Least distance of two UAVs in the air [m]; None of a single one, or if it is not known."""
+    nearest_zone_m: float | None = None
+    """Least distance of a UAV in flight from a zone [m]; None without zones, or if not known."""
+    lowest_charge_frac: Mapping[str, float] = field(default_factory=dict)
+    """By UAV, the least charge of its battery that was told while it took part."""
     hint: str = _HINT
     """How to get more; the last line of `render`."""
 
@@ -101,6 +105,8 @@ class MissionReport:
             "executed_objective": result.executed_objective,
             "executed_schedule": schedule_as_json(self.executed_schedule),
             "closest_approach_m": self.closest_approach_m,
+            "nearest_zone_m": self.nearest_zone_m,
+            "lowest_charge_frac": dict(self.lowest_charge_frac),
             "done": list(result.done),
             "failed": list(result.failed),
             "open": list(result.open),

@@ -1,4 +1,4 @@
-"""How long vehicles take for legs and missions, beside what plans reckon with.
+"""How long vehicles take for legs and missions, beside what plans reckon with, and what they keep.
 
 Leaves out: how that is asked for and told (sim.bench.legs).
 """
@@ -15,7 +15,8 @@ from pathlib import Path
 from typing import Any
 
 from swarm.allocation import field
-from swarm.model import Mission, Task, TaskId, UavId
+from swarm.kernels.field import fly_lists
+from swarm.model import BaseId, Mission, Task, TaskId, UavId
 from swarm.protocol.calibration import FlightRates, fleet_as_told
 from swarm.protocol.fields import Point
 from swarm.runtime.errors import Fault, InputError
@@ -81,7 +82,7 @@ def load_run(path: Path) -> Mapping[str, Any]:
         raise InputError(Fault(str(path), "", fault.strerror or str(fault), _REMEDY)) from fault
     except ValueError as fault:
         raise InputError(Fault(str(path), "", "it is not JSON", _REMEDY)) from fault
-    keys = ("scenario", "executed_schedule", "completion_s", "makespan_s")
+    keys = ("scenario", "executed_schedule", "completion_s", "makespan_s", "done")
     lacks = [key for key in keys if not isinstance(told, dict) or key not in told]
     if lacks:
         raise InputError(Fault(str(path), lacks[0], "is missing", _REMEDY))
@@ -169,6 +170,78 @@ def makespan_frac(run: Mapping[str, Any]) -> float | None:
     """Flown makespan over that of the plan; None where there was no plan."""
     planned_s = max(run["completion_s"].values(), default=0.0)
     return float(run["makespan_s"] / planned_s) if planned_s > 0.0 else None
+
+
+@dataclass(frozen=True, slots=True)
+class KeptLimits:
+    """What one flight kept of what it had to."""
+
+    tasks: int
+    """That were to be done: all but those that the plan left out."""
+    done: int
+    """Of them."""
+    nearest_zone_m: float | None
+    """How near a UAV in flight came to a zone [m]; None without zones, or if that is not told."""
+    margin_m: float
+    """How near it may come [m]."""
+    charge_frac: float | None
+    """Least charge, of the UAV that came nearest to its reserve; None if none was told."""
+    reserve_frac: float
+    """Of that UAV."""
+
+    @property
+    def kept(self) -> bool:
+        """Whether all of that was kept, as far as it is told."""
+        far = self.nearest_zone_m is None or self.nearest_zone_m >= self.margin_m
+        charged = self.charge_frac is None or self.charge_frac >= self.reserve_frac
+        return self.done == self.tasks and far and charged
+
+
+def limits_kept(mission: Mission, run: Mapping[str, Any]) -> KeptLimits:
+    """What the flight of ``mission`` kept of which `swarm run --json` said ``run``."""
+    wanted = {task.id for task in mission.tasks} - set(run.get("left_out", ()))
+    reserves = {uav.id: uav.reserve_frac for uav in mission.uavs if uav.endurance_s is not None}
+    told = run.get("lowest_charge_frac", {})
+    charges = [(told[uav] - frac, told[uav], frac) for uav, frac in reserves.items() if uav in told]
+    _, charge_frac, reserve_frac = min(charges, default=(0.0, None, 0.0))
+    return KeptLimits(
+        tasks=len(wanted),
+        done=len(wanted.intersection(run["done"])),
+        nearest_zone_m=run.get("nearest_zone_m"),
+        margin_m=mission.zone_margin_m,
+        charge_frac=charge_frac,
+        reserve_frac=reserve_frac,
+    )
+
+
+def reckoned_makespan_s(mission: Mission, run: Mapping[str, Any]) -> float | None:
+    """When the lists that were flown would have ended by the model [s]; None if they could not be.
+
+    Agents may do something else than planned; this leaves their choices out. Landing and climbing
+    take as long as the run says that they were found to.
+    """
+    problem = field.FieldProblem.from_mission(mission)
+    found = [run.get("calibration", {}).get(uav, {}) for uav in problem.uav_ids]
+    down_s, up_s = ([each.get(key, 0.0) for each in found] for key in ("land_s", "climb_s"))
+    as_briefed = [1.0] * problem.n_uav
+    problem = problem.calibrated(as_briefed, as_briefed, down_s, up_s, max(up_s))
+    lists = [_items_of(problem, run["executed_schedule"].get(uav, ())) for uav in problem.uav_ids]
+    flown = fly_lists(problem.kernel, field.FieldState.at_start(problem), lists)
+    ends_s = flown.times_s[[item >= 0 for items in lists for item in items], 3].tolist()
+    return max(ends_s, default=None) if flown.feasible else None
+
+
+def _items_of(problem: field.FieldProblem, entries: Sequence[Mapping[str, Any]]) -> list[int]:
+    """A list as it was flown, up to its last task."""
+    items = []
+    for entry in entries:
+        if (name := TaskId(entry["go"])) in problem.task_ids:
+            items.append(2 * problem.task_ids.index(name) + bool(entry["reversed"]))
+        elif (base := BaseId(entry["go"].partition(":")[2])) in problem.base_ids:
+            items.append(-1 - problem.base_ids.index(base))
+    while items and items[-1] < 0:
+        items.pop()
+    return items
 
 
 def leg_times(legs: Sequence[FlownLeg], acceleration_m_s2: float | None) -> LegTimes | None:

@@ -10,7 +10,15 @@ from typing import Any
 import pytest
 
 from coordinator.planner.plan_report import schedule_as_json
-from sim.bench.flown_legs import leg_times, legs_flown, load_run, makespan_frac
+from sim.bench.flown_legs import (
+    leg_times,
+    legs_flown,
+    limits_kept,
+    load_run,
+    makespan_frac,
+    reckoned_makespan_s,
+)
+from sim.bench.legs import legs as bench_legs
 from sim.world.simulation import simulate_mission
 from sim.world.uncertainty import Uncertainty
 from swarm.model import TaskId, UavId
@@ -19,6 +27,8 @@ from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
 
 MEADOW = load_scenario(resolve_scenario("meadow"))
+RESERVOIR = load_scenario(resolve_scenario("reservoir-inspection"))
+TASKS = {task.id for task in RESERVOIR.tasks}
 STARTS = {uav.id: uav.position_enu_m for uav in MEADOW.uavs}
 PLACES = {task.id: task.position_enu_m for task in MEADOW.tasks}
 
@@ -89,11 +99,13 @@ def test_the_makespan_is_set_beside_the_plans() -> None:
 
 def test_in_virtual_time_the_fields_legs_take_what_the_model_says() -> None:
     """Bases, zones, wind, lines and a window: legs round zones from task to task, and no others."""
-    mission = load_scenario(resolve_scenario("reservoir-inspection"))
+    mission = RESERVOIR
     flown = simulate_mission(mission, method="guided", seed=0, uncertainty=Uncertainty())
     schedule: dict[str, Any] = schedule_as_json(flown.world.executed_schedule())
     run = {"executed_schedule": schedule, "completion_s": {}, "makespan_s": 0.0}
+    ended_s = [each["end_s"] for e in schedule.values() for each in e if each["go"] in TASKS]
 
+    assert reckoned_makespan_s(mission, run) == pytest.approx(max(ended_s), abs=0.05)
     legs = legs_flown(mission, run, "flight.json")
 
     went = [(before["go"], at["go"]) for e in schedule.values() for before, at in pairwise(e)]
@@ -103,6 +115,80 @@ def test_in_virtual_time_the_fields_legs_take_what_the_model_says() -> None:
     assert 5 <= len(legs) <= len(mission.uavs) + len(between) - from_bases
     for leg in legs:
         assert leg.flown_s == pytest.approx(leg.planned_s, abs=0.05)
+
+
+def test_lists_are_reckoned_with_landing_and_climbing_as_found() -> None:
+    """A swap for a window of two minutes later takes so much longer; what cannot be is not told."""
+    lists = {"uav2": ["base:dam-yard", "spillway"]}
+    run = {"executed_schedule": scheduled(lists)}
+    slower = {"uav2": {"land_s": 20.0, "climb_s": 10.0}}
+
+    by_brief_s = reckoned_makespan_s(RESERVOIR, run)
+    found_s = reckoned_makespan_s(RESERVOIR, {**run, "calibration": slower})
+
+    assert by_brief_s is not None
+    assert found_s == pytest.approx(by_brief_s + 30.0)
+    all_at_once = {"uav2": sorted(TASKS)}
+    assert reckoned_makespan_s(RESERVOIR, {"executed_schedule": scheduled(all_at_once)}) is None
+
+
+def scheduled(lists: dict[str, list[str]]) -> dict[str, Any]:
+    return {
+        uav: [{"go": name, "reversed": False} for name in (*names, "start")]
+        for uav, names in lists.items()
+    }
+
+
+@pytest.mark.parametrize(
+    ("change", "kept"),
+    [
+        ({}, True),
+        ({"done": sorted(TASKS - {"weir"})}, False),
+        ({"done": sorted(TASKS - {"weir"}), "left_out": {"weir": "energy"}}, True),
+        ({"nearest_zone_m": 19.9}, False),
+        ({"nearest_zone_m": None}, True),
+        ({"lowest_charge_frac": {"uav1": 0.3, "uav2": 0.19}}, False),
+        ({"lowest_charge_frac": {}}, True),
+    ],
+)
+def test_a_flight_keeps_its_limits_or_does_not(change: dict[str, Any], kept: bool) -> None:
+    run = {
+        "done": sorted(TASKS),
+        "nearest_zone_m": 20.0,
+        "lowest_charge_frac": {"uav1": 0.3, "uav2": 0.21},
+    } | change
+
+    found = limits_kept(RESERVOIR, run)
+
+    assert found.kept is kept
+    assert (found.margin_m, found.done) == (20.0, len(run["done"]))
+    lowest = min(run["lowest_charge_frac"].values(), default=None)
+    assert (found.charge_frac, found.reserve_frac) == (lowest, 0.0 if lowest is None else 0.2)
+
+
+def test_the_command_tells_what_is_found_and_fails_where_a_limit_is_not_kept(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path, done = tmp_path / "flight.json", sorted(task.id for task in MEADOW.tasks)
+    scenario = resolve_scenario("meadow")
+    path.write_text(json.dumps(FLOWN | {"done": done}))
+
+    assert bench_legs(scenario, [path], 2.0, json=True) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["scenario"], len(found["legs"])) == ("meadow", 3)
+    assert found["makespan_frac"] == [pytest.approx(29.0 / 20.0)]
+    assert found["flown_lists_frac"][0] > 1.0
+    assert (found["limits"][0]["done"], found["limits"][0]["kept"]) == (6, True)
+
+    path.write_text(json.dumps(FLOWN | {"done": done[1:]}))
+    assert bench_legs(scenario, [path], None, json=False) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "meadow: 3 legs"
+    assert lines[3:] == [
+        "  makespan flown / planned: 1.45",
+        f"  makespan flown / planned, of the lists as flown: {found['flown_lists_frac'][0]:.2f}",
+        "  5 of 6 tasks done: not kept",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from swarm.scenario.files import resolve_scenario, shipped_scenarios
 
 PLAIN = ["meadow", "orchard", "table-1", "valley-popups", "valley-survey"]
 """Those of schema 1."""
-NAMES = sorted([*PLAIN, "reservoir-inspection"])
+NAMES = sorted([*PLAIN, "reservoir-inspection", "vineyard"])
 
 
 def shipped(name: str) -> Mission:
