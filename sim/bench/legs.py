@@ -82,7 +82,7 @@ def legs(
         ]
         times_json = None if times is None else asdict(times)
         kept = [{**asdict(each), "kept": each.kept} for each in limits]
-        found = {"scenario": mission.name, "legs": legs, "times": times_json}
+        found: dict[str, object] = {"scenario": mission.name, "legs": legs, "times": times_json}
         found |= {"makespan_frac": makespans, "flown_lists_frac": reckoned_fracs, "limits": kept}
         typer.echo(dumps(found))
     else:

@@ -28,7 +28,7 @@ from swarm.scenario.files import resolve_scenario
 
 MEADOW = load_scenario(resolve_scenario("meadow"))
 RESERVOIR = load_scenario(resolve_scenario("reservoir-inspection"))
-TASKS = {task.id for task in RESERVOIR.tasks}
+TASKS = {str(task.id) for task in RESERVOIR.tasks}
 STARTS = {uav.id: uav.position_enu_m for uav in MEADOW.uavs}
 PLACES = {task.id: task.position_enu_m for task in MEADOW.tasks}
 
@@ -152,7 +152,7 @@ def scheduled(lists: dict[str, list[str]]) -> dict[str, Any]:
     ],
 )
 def test_a_flight_keeps_its_limits_or_does_not(change: dict[str, Any], kept: bool) -> None:
-    run = {
+    run: dict[str, Any] = {
         "done": sorted(TASKS),
         "nearest_zone_m": 20.0,
         "lowest_charge_frac": {"uav1": 0.3, "uav2": 0.21},
