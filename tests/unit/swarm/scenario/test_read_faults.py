@@ -17,7 +17,7 @@ SCHEMA = "give schema = 1 or schema = 2"
 TOP_KEYS = "schema, name, mission, origin, uav, base, zone, task, tasks_from"
 TASK_KEYS = (
     "id, position_m, lat_deg, lon_deg, alt_m, value, service_s, kind, appears_s, "
-    "due_s, opens_s, closes_s, path_m, path, height_m"
+    "due_s, opens_s, closes_s, path_m, path, trigger_m, height_m"
 )
 
 # What is replaced in VALID, by what, and the lines it takes.

@@ -14,7 +14,7 @@ from tests.support.small_scenario import VALID as SCHEMA_1
 from tests.unit.swarm.scenario.test_schema_2_read import VALID as SCHEMA_2
 
 ALL = (
-    "airspeed_m_s, endurance_s, due_s, opens_s, closes_s, path_m, height_m, "
+    "airspeed_m_s, endurance_s, due_s, opens_s, closes_s, path_m, trigger_m, height_m, "
     "wind_m_s, [[base]], [[zone]] and band_m"
 )
 COMMANDS: dict[str, list[str]] = {
