@@ -13,12 +13,12 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from agent.vehicle.firmware.failsafes import ARDUCOPTER_NAMES, Failsafes, arducopter_failsafes
+from agent.vehicle.firmware.fences import ARDUCOPTER_FENCE_NAMES, FenceSetup, arducopter_fence
 from agent.vehicle.firmware.kinematics import (
     ARDUCOPTER_LIMITS,
     Kinematics,
     arducopter_kinematics,
 )
-from agent.vehicle.firmware.fences import ARDUCOPTER_FENCE_NAMES, FenceSetup, arducopter_fence
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware, SpeedParameter
 from agent.vehicle.messages import (
     BatteryStatus,

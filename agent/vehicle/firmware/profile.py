@@ -13,8 +13,8 @@ from typing import ClassVar
 
 from agent.vehicle.commands import result_text
 from agent.vehicle.firmware.failsafes import Failsafes
-from agent.vehicle.firmware.kinematics import Kinematics, LimitParameter
 from agent.vehicle.firmware.fences import POLYGONS, FenceSetup
+from agent.vehicle.firmware.kinematics import Kinematics, LimitParameter
 from agent.vehicle.messages import (
     AltitudeFrame,
     CommandInt,

@@ -14,8 +14,8 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from agent.vehicle.firmware.failsafes import PX4_NAMES, Failsafes, px4_failsafes
-from agent.vehicle.firmware.kinematics import PX4_LIMITS, Kinematics, px4_kinematics
 from agent.vehicle.firmware.fences import PX4_FENCE_NAMES, FenceSetup, px4_fence
+from agent.vehicle.firmware.kinematics import PX4_LIMITS, Kinematics, px4_kinematics
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware, Mode, SpeedParameter
 from agent.vehicle.messages import (
     CommandLong,
