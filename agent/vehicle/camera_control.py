@@ -43,6 +43,6 @@ class CameraControl:
             return
         self._ended = True
         if ended.ending is CommandOutcome.REFUSED:
-            self._conversation.tell_caution("it does not take the trigger of its camera")
+            self._conversation.tell_caution("camera", "it does not take the trigger of its camera")
         elif ended.ending is CommandOutcome.UNANSWERED:
-            self._conversation.tell_caution("the trigger of its camera does not answer")
+            self._conversation.tell_caution("camera", "the trigger of its camera does not answer")

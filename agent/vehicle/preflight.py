@@ -17,6 +17,7 @@ from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.firmware.failsafes import Failsafes
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import (
+    Heartbeat,
     Inbound,
     ParameterRead,
     ParameterSet,
@@ -30,6 +31,10 @@ from swarm.protocol.fields import Point
 
 _SIMULATED = "SWARM_SIMULATED"
 """Parameter of the autopilots that `swarm autopilot` simulates; no firmware has it."""
+_STATE_UNINIT = 0
+"""MAV_STATE."""
+_PREARM_TEXT_AGE_S = 35.0
+"""ArduPilot repeats what fails before arming every 30 s."""
 
 
 class FailsafeReading:
@@ -271,3 +276,20 @@ def start_fault(order: Prepare, position: Position, config: BridgeConfig) -> str
     if height_m > 2.0 * config.fence_height_m:
         return f"the start lies {height_m:.0f} m above the vehicle's home"
     return None
+
+
+def boot_state(session: VehicleSession, firmware: Firmware, heartbeat: Heartbeat) -> str:
+    """Why a vehicle that has just booted is not ready to be told anything.
+
+    PX4 is "uninitialised" whenever its checks fail while it is disarmed, and they say why.
+    """
+    unready = firmware.unready(session.vehicle)
+    if heartbeat.system_status == _STATE_UNINIT and session.vehicle.prearm_heard and unready:
+        return with_warning(session, unready)
+    return "the autopilot is booting"
+
+
+def with_warning(session: VehicleSession, reason: str) -> str:
+    """The reason, and what the vehicle has said lately of what it lacks."""
+    text = session.vehicle.recent_warning(session.now_s, _PREARM_TEXT_AGE_S)
+    return f"{reason} ({text})" if text else reason

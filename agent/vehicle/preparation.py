@@ -27,7 +27,15 @@ from agent.vehicle.flight_limits import LimitsCheck
 from agent.vehicle.leg import RepositionLeg
 from agent.vehicle.messages import Heartbeat, Inbound, LandedState, Outbound, Position
 from agent.vehicle.onboard_mission import OnboardMission
-from agent.vehicle.preflight import CruiseSpeedSetting, FailsafeCheck, aim, home_alt_m, start_fault
+from agent.vehicle.preflight import (
+    CruiseSpeedSetting,
+    FailsafeCheck,
+    aim,
+    boot_state,
+    home_alt_m,
+    start_fault,
+    with_warning,
+)
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.supervision import PilotConsent
 from swarm.model.frames import wgs84_from_enu
@@ -36,10 +44,6 @@ _CLIMB_PROGRESS_M = 0.2
 _CLIMB_TOLERANCE_FRAC = 0.05
 _CLIMB_TOLERANCE_M = 1.0
 """Autopilots end a takeoff that much too low, and go on from there."""
-_STATE_UNINIT = 0
-"""MAV_STATE."""
-_PREARM_TEXT_AGE_S = 35.0
-"""ArduPilot repeats what fails before arming every 30 s."""
 _CAME_DOWN = (
     "it was left in the air and stands on the ground now: look after it, "
     "and start its agent with --rejoin"
@@ -158,7 +162,7 @@ class _Preparation:
         if self.done or self.failure is not None:
             return
         if not firmware.has_booted(heartbeat):
-            self.waiting_for = self._booting(heartbeat)
+            self.waiting_for = boot_state(self._session, self._firmware, heartbeat)
             return
         self._consent.on_heartbeat(heartbeat)
         if self._mission is not None and self._mission_begun:
@@ -188,21 +192,6 @@ class _Preparation:
             self._session.say(*self._take_off(vehicle.position))
         if not self.done and self.failure is None:
             self._limits.ask(armed=heartbeat.armed)
-
-    def _booting(self, heartbeat: Heartbeat) -> str:
-        """Why it is not ready to be told anything.
-
-        PX4 is "uninitialised" whenever its checks fail while it is disarmed, and they say why.
-        """
-        vehicle = self._session.vehicle
-        unready = self._firmware.unready(vehicle)
-        if heartbeat.system_status != _STATE_UNINIT or not vehicle.prearm_heard or unready is None:
-            return "the autopilot is booting"
-        return self._with_warning(unready)
-
-    def _with_warning(self, reason: str) -> str:
-        text = self._session.vehicle.recent_warning(self._session.now_s, _PREARM_TEXT_AGE_S)
-        return f"{reason} ({text})" if text else reason
 
     def _get_commanded(self, heartbeat: Heartbeat) -> None:
         """It is in a mode that does not take our targets."""
@@ -259,7 +248,7 @@ class _Preparation:
         if self._order.left_in_air and not self._arm.command.given:
             return self._wait(_NO_PLACE) if vehicle.position is None else self._fail(_CAME_DOWN)
         if unready := self._firmware.unready(vehicle):
-            return self._wait(self._with_warning(unready))
+            return self._wait(with_warning(self._session, unready))
         if objection := self._session.arming_objection():
             return self._wait(objection)
         place = vehicle.position
