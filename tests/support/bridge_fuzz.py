@@ -479,7 +479,9 @@ class Episode:
         place = (self.random.uniform(-50.0, 50.0), self.random.uniform(-50.0, 50.0), 10.0)
         via = self._corners() if self.random.random() < 0.5 else ()
         stay_s = self.random.choice((0.0, 5.0))
-        return GoTo(self._legs, place if inside else self._place(), stay_s, via_enu_m=via)
+        order = GoTo(self._legs, place if inside else self._place(), stay_s, via_enu_m=via)
+        trigger_m = self.random.choice((None, None, 0.0, 15.0))
+        return order if trigger_m is None else replace(order, trigger_m=trigger_m)
 
     def _place(self) -> tuple[float, float, float]:
         random = self.random

@@ -122,6 +122,9 @@ _COMMANDS: dict[FlightPhase, set[int]] = {
 }
 """What may be commanded in each phase, beside requests for messages; motors are started
 while preparing only."""
+_TRIGGER = 206
+_IN_OUR_HANDS = _COMMANDS.keys() - {FlightPhase.IDLE, FlightPhase.HANDED_OVER}
+"""In which a camera may be told to take pictures, or none."""
 _COMMANDS_OF_MISSIONS: dict[FlightPhase, set[int]] = {
     FlightPhase.HOVERING: {SET_MODE, SPEED},
     FlightPhase.FLYING: {SET_MODE, SPEED},
@@ -364,6 +367,8 @@ class BridgeWatch:
         allowed = set[int]().union(*(_COMMANDS[phase] for phase in phases))
         if missions:
             allowed |= set[int]().union(*(_COMMANDS_OF_MISSIONS.get(p, set()) for p in phases))
+        if phases & _IN_OUR_HANDS:
+            allowed.add(_TRIGGER)
         hold(message.command in allowed, f"commands {message.command} while {phases}")
         match message.command:
             case 192:
@@ -383,6 +388,10 @@ class BridgeWatch:
             case 176:
                 hold(message.param1 == _MODE_ENABLED, f"mode of kind {message.param1}")
                 self._see_mode(message, phases, missions=missions)
+            case 206:
+                hold(message.param1 in (0.0, 15.0), f"pictures every {message.param1} m")
+                flies = FlightPhase.FLYING in phases
+                hold(flies or message.param1 == 0.0, f"pictures while {phases}")
             case 207:
                 hold(self.fake is FakeCopter, "switches a fence that has no switch")
                 hold(message.param2 == 4.0, f"switches fences {message.param2}")
