@@ -308,8 +308,7 @@ class OnboardFence:
         elif self._held != self._wanted:
             self._put()
         elif not self._conversation.commands.pending(_TAG):
-            self._asked_on = not self._is_on
-            self._conversation.send(_TAG, self._firmware.switch_polygons(on=self._asked_on))
+            self._switch(on=not self._is_on)
 
     def _knows_setup(self) -> bool:
         """Whether its parameters are known, or it will not tell them; asks for them if not."""
@@ -331,7 +330,13 @@ class OnboardFence:
         if self._sent:
             self._conversation.say(*self._transfer.upload(fence_items(self._sent), now_s))
         else:
+            if self._is_on:  # ArduCopter heeds what it has cleared for some tenths of a second
+                self._switch(on=False)
             self._conversation.say(*self._transfer.clear(now_s))
+
+    def _switch(self, *, on: bool) -> None:
+        self._asked_on = on
+        self._conversation.send(_TAG, self._firmware.switch_polygons(on=on))
 
     def _settle(self) -> None:
         """Take the outcome of a transfer, once."""
