@@ -5,6 +5,7 @@ Names follow https://mavlink.io/en/messages/common.html; only what the bridge us
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -26,6 +27,9 @@ class AltitudeFrame(IntEnum):
     NONE = 2
     """MAV_FRAME_MISSION: a mission item without a place."""
     HOME = 3
+
+
+_RISES_M_S = 0.3
 
 
 class MissionKind(IntEnum):
@@ -65,6 +69,12 @@ class Position:
     velocity_enu_m_s: tuple[float, float, float]
     known: bool
     """False while the autopilot has no position and sends zeros."""
+
+    @property
+    def rises(self) -> bool:
+        """Whether it climbs straight up, as after a takeoff."""
+        east_m_s, north_m_s, up_m_s = self.velocity_enu_m_s
+        return up_m_s >= _RISES_M_S and math.hypot(east_m_s, north_m_s) <= 0.5 * up_m_s
 
 
 @dataclass(frozen=True, slots=True)

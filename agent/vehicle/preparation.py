@@ -227,6 +227,7 @@ class _Preparation:
 
     def _go_on_in_the_air(self, position: Position) -> None:
         self._flew = True
+        self._saw_takeoff |= self._aims and position.rises
         # Repeated now, it would interrupt what follows.
         self._session.say(*self._takeoff.command.cancel(self._session.now_s))
         if self._arm.command.given:  # what it does without us may not have been read to the end
@@ -443,7 +444,7 @@ class Preparing(Activity):
     @property
     def done(self) -> bool:
         """Whether the vehicle is where it should be, with its cruise speed set."""
-        return self._preparation is not None and self._preparation.done
+        return self._preparation is not None and self._preparation.done and self._session.is_placed
 
     @property
     def failure(self) -> str | None:
@@ -492,5 +493,5 @@ class Preparing(Activity):
         preparation.advance(heartbeat)
         if preparation.caution is not None:
             session.tell_caution("failsafes", preparation.caution)
-        if not preparation.done and preparation.failure is None:
-            session.tell_not_ready(preparation.waiting_for)
+        if not self.done and preparation.failure is None:
+            session.tell_not_ready(_NO_PLACE if preparation.done else preparation.waiting_for)

@@ -114,6 +114,11 @@ class VehicleSession(Conversation):
         """Where the vehicle is, as far as that counts and is fresh [m; mission origin]."""
         return self.position_filter.place_m(self.now_s - self.config.stream_timeout_s)
 
+    @property
+    def is_placed(self) -> bool:
+        """Whether it is known where it is, where that matters: no way is flown among zones else."""
+        return not self.guard or self.known_place_m() is not None
+
     def arming_objection(self) -> str | None:
         """Why its motors must not be started, in words; None if they may."""
         return self.safety.arming_objection(self.vehicle, self.now_s)

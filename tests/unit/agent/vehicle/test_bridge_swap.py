@@ -22,9 +22,11 @@ from agent.core.interface import (
     ReturnAdvised,
     Swap,
     Swapped,
+    VehicleReady,
 )
 from agent.vehicle.activity import FlightPhase
 from agent.vehicle.config import BridgeConfig, CommandStyle
+from swarm.model import Zone, ZoneId
 from tests.support.bridge_flight import ORIGIN, BridgeFlight
 from tests.support.fake_copter import ARM, REPOSITION, SET_MODE, TAKEOFF, FakeCopter
 from tests.support.fake_px4 import FakePx4
@@ -352,6 +354,37 @@ def test_one_left_climbing_far_from_its_start_climbs_on_where_it_is(
     assert flight.copter.position_m == pytest.approx((90.0, 40.0, 10.0), abs=1.5)
     recent_m = [each.position_enu_m for each in flight.telemetry[-300:]]
     assert max(math.dist(place_m[:2], base_m[:2]) for place_m in recent_m) < 1.0
+
+
+def test_among_zones_one_found_in_the_air_takes_targets_once_its_place_is_known(
+    fake: type[FakeCopter], config: BridgeConfig
+) -> None:
+    """Else the first target after a restart would be refused, and its task left alone."""
+    wall = Zone(ZoneId("wall"), ((200.0, 0.0), (210.0, 0.0), (210.0, 10.0)))
+    flight = BridgeFlight(fake(ORIGIN), replace(config, zones=(wall,))).prepared()
+    flight.restart()
+    flight.order(Prepare(ABOVE, 4.0, resume=True, left_in_air=True))
+    flight.run_until(VehicleReady())
+    flight.order(GoTo(1, (40.0, 0.0, 10.0)))
+
+    flight.run_until(Arrived(1))
+    assert not [each for each in flight.reports if isinstance(each, Refused)]
+
+
+def test_one_left_in_a_takeoff_that_says_it_flies_climbs_before_it_takes_targets() -> None:
+    """ArduCopter tells of no takeoff once it is off the ground; low targets lead into things."""
+    flight = BridgeFlight(FakeCopter(ORIGIN), BridgeConfig(1, ORIGIN))
+    flight.order(Prepare(ABOVE, 4.0))
+    for _ in range(2000):
+        if flight.copter.position_m[2] > 1.0:
+            break
+        flight.step()
+    flight.copter.in_takeoff = False
+    flight.restart(down_s=0.2)
+    flight.order(Prepare(ABOVE, 4.0, resume=True, ground_up_m=0.0, left_in_air=True))
+    flight.run_until(VehicleReady())
+
+    assert flight.copter.position_m[2] > 8.0
 
 
 def test_one_that_came_down_is_told_to_stand_there_once_its_place_is_known(
