@@ -32,7 +32,7 @@ from tests.support.fake_copter import ARM
 from tests.support.seeds import seeds
 
 LIMIT_S = 900.0
-ENDURANCE_S = 140.0
+ENDURANCE_S = 155.0
 TASKS = {f"t{number}" for number in range(len(PLACES))}
 
 
@@ -189,22 +189,29 @@ def test_an_agent_killed_at_its_base_goes_on_where_its_vehicle_is(seed: int, mom
     flavour = list(FirmwareModelName)[seed % 2]
     style = list(CommandStyle)[(seed // 2 + MOMENTS.index(moment)) % 2]
     fleet = PastureFleet(flavour, style, mission=pasture(ENDURANCE_S), seed=seed)
-    uav, found = UAVS[int(rng.integers(2))], list(RestartMemory)[int(rng.integers(2))]
-    begins: dict[str, tuple[Callable[..., bool], float]] = {
-        "landing": (in_phase(FlightPhase.LANDING), 25.0),
-        "swapping": (is_landed, BARN.swap_s),
-        "climbing": (departs(fleet, uav), 15.0),
+    found = list(RestartMemory)[int(rng.integers(2))]
+    begins: dict[str, tuple[Callable[[str], Callable[..., bool]], float]] = {
+        "landing": (lambda _: in_phase(FlightPhase.LANDING), 25.0),
+        "swapping": (lambda _: is_landed, BARN.swap_s),
+        "climbing": (partial(departs, fleet), 15.0),
     }
     begun, lasts_s = begins[moment]
     down_s = float(rng.choice([0.3, 2.0, 8.0, 25.0]))
+    killed: list[str] = []
 
-    def kill() -> None:
+    def kill(uav: str) -> None:
+        """Whoever does it first."""
+        if killed:
+            return
+        killed.append(uav)
         fleet.world.crash(uav)
         back_s = fleet.world.queue.now_s() + down_s
         fleet.at(back_s, partial(fleet.world.restart, uav, found))
 
-    fleet.once(uav, begun, float(rng.uniform(0.0, lasts_s)), kill)
+    after_s = float(rng.uniform(0.0, lasts_s))
+    for uav in UAVS:
+        fleet.once(uav, begun(uav), after_s, partial(kill, uav))
     fleet.fly(LIMIT_S)
 
-    assert fleet.books[uav].lives == 2
+    assert [fleet.books[uav].lives for uav in killed] == [2]
     assert_all_done(fleet)

@@ -28,7 +28,7 @@ ONLINE = {"greedy", "lookahead", "nearest", "value-per-time", "guided"}
     ("line", "words"),
     [
         ("swarm re", {"reproduce", "resume", "return"}),
-        ("swarm plan v", {"valley-popups", "valley-survey"}),
+        ("swarm plan v", {"valley-popups", "valley-survey", "vineyard"}),
         ("swarm plan --meth", {"--method"}),
         ("swarm plan table-1 --method ", {*ONLINE, "exact"}),
         ("swarm simulate table-1 --method g", {"greedy", "guided"}),
