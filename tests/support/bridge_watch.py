@@ -207,6 +207,8 @@ class BridgeWatch:
         """Number of that order."""
         self._stood = self._may_start = False
         """Whether it landed there and has not flown since, and may start again."""
+        self._left_m: tuple[Point, ...] = ()
+        """Corners of the mission that an earlier life left on the vehicle, which is told anew."""
 
     def step(self, event: BridgeEvent, now_s: float) -> list[BridgeAction]:
         """Step the bridge and look at what it does."""
@@ -225,6 +227,7 @@ class BridgeWatch:
         self._gave_mission &= not isinstance(event, Return)
         actions = self.bridge.step(event, now_s)
         self.fake = _FAKES.get(type(self.bridge._session.firmware), self.fake)
+        self._see_what_was_left()
         after = self.bridge.phase
         if after not in (FlightPhase.STANDING, FlightPhase.PREPARING):
             self._stood = self._may_start = False
@@ -411,6 +414,11 @@ class BridgeWatch:
         elif mode != self.fake.own_mode:
             hold(missions and mode == self.fake.mission_mode, f"mode {mode}")
 
+    def _see_what_was_left(self) -> None:
+        mission, origin = self.bridge._session.mission, self.bridge.config.origin
+        if mission is not None and mission._inherited and mission._standing is not None:
+            self._left_m = tuple(enu_from_wgs84(origin, *c) for c in mission._standing.corners)
+
     def _see_place(self, message: Any, phases: set[FlightPhase]) -> None:
         config = self.bridge.config
         place_m = enu_from_wgs84(config.origin, message.x / 1e7, message.y / 1e7, message.z)
@@ -420,7 +428,7 @@ class BridgeWatch:
         if FlightPhase.HOLDING in phases and self._is_borne_out(place_m):
             return
         places_m, base_m = self._task.places_m, self._task.base_m
-        ordered = any(_near(place_m, place) for place in places_m)
+        ordered = any(_near(place_m, place) for place in (*places_m, *self._left_m))
         if FlightPhase.LANDING in phases and base_m is not None:
             ordered |= math.dist(place_m[:2], base_m[:2]) <= _TOLERANCE_M
         if self._task.climbs:
