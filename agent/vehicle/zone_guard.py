@@ -103,13 +103,12 @@ def _leaves(obstacles: Obstacles, here: Point, there: Point) -> bool:
     here_m, there_m = np.array([here[:2]]), np.array([there[:2]])
     if obstacles.free(here_m)[0]:
         return False
+    out_m = math.dist(obstacles.way_out_m(here_m[0]), here[:2])
     length_m = math.dist(here[:2], there[:2])
-    share = np.linspace(0.0, 1.0, 2 + math.ceil(length_m / _STEP_M))[:, None]
+    soon_m = min(
+        length_m, _MORE * out_m + _MORE_M
+    )  # the rest may be as long as hostile input has it
+    share = np.linspace(0.0, soon_m, 2 + math.ceil(soon_m / _STEP_M))[:, None] / (length_m or 1.0)
     places_m: FloatArray = here_m + share * (there_m - here_m)
     outside = np.flatnonzero(obstacles.free(places_m))
-    if not len(outside):
-        return False
-    first_m = places_m[outside[:1]]
-    out_m = math.dist(obstacles.way_out_m(here_m[0]), here[:2])
-    short = math.dist(first_m[0], here[:2]) <= _MORE * out_m + _MORE_M
-    return short and bool(obstacles.clear(first_m, there_m)[0])
+    return bool(len(outside)) and bool(obstacles.clear(places_m[outside[:1]], there_m)[0])

@@ -205,6 +205,8 @@ class BridgeWatch:
         """Where it was last ordered to land for another battery."""
         self._swap_leg: int | None = None
         """Number of that order."""
+        self._swap_before: tuple[Point | None, int | None] = None, None
+        """As these were before this step."""
         self._stood = self._may_start = False
         """Whether it landed there and has not flown since, and may start again."""
         self._left_m: tuple[Point, ...] = ()
@@ -216,6 +218,7 @@ class BridgeWatch:
         self._now_s = now_s
         before = self.bridge.phase
         self._task_before, self._ordered = self._task, event
+        self._swap_before = self._base_m, self._swap_leg
         if isinstance(event, Prepare | GoTo | Hold | Return | Swap):
             self._note(event)
         elif isinstance(event, KeepOut):
@@ -511,6 +514,7 @@ class BridgeWatch:
                 self._task = replace(self._task, leg=None)
             case Refused(order) if order is self._ordered:
                 self._task = self._task_before  # it changes nothing
+                self._base_m, self._swap_leg = self._swap_before
             case Refused() if self.bridge.phase is FlightPhase.STANDING:
                 # It did not leave, and stands there by the same order still.
                 self._task = replace(self._task, leg=self._swap_leg)
