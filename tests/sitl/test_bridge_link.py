@@ -18,6 +18,7 @@ from structlog.testing import capture_logs
 
 from agent.core.interface import (
     Arrived,
+    FlightLimits,
     GoTo,
     Home,
     NotReady,
@@ -438,6 +439,7 @@ async def test_vehicle_is_flown_through_a_socket_from_preparation_to_landing() -
     finally:
         await vehicle.close()
         await served.stop()
-    others = [r for r in reports if not isinstance(r, Telemetry | NotReady)]
+    others = [r for r in reports if not isinstance(r, Telemetry | NotReady | FlightLimits)]
     assert others == [VehicleReady(), Arrived(1), Arrived(2), ReturnBegun(), Home()]
+    assert any(isinstance(report, FlightLimits) for report in reports)
     assert not served.copter.armed
