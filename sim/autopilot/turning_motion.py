@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from sim.world.motion import Point, minus, plus
+from sim.world.motion import Point, finite_acceleration_m_s2, minus, plus
 
 _AT_REST: Point = (0.0, 0.0, 0.0)
 _STILL_M_S = 1e-9
@@ -178,8 +178,4 @@ class TurningMotion:
         Raises:
             ValueError: it is not positive and finite.
         """
-        if not 0.0 < acceleration_m_s2 < math.inf:
-            raise ValueError(
-                f"acceleration must be positive and finite, not {acceleration_m_s2} m/s²"
-            )
-        self._limit_m_s2 = acceleration_m_s2
+        self._limit_m_s2 = finite_acceleration_m_s2(acceleration_m_s2)

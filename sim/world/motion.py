@@ -32,6 +32,17 @@ Point = tuple[float, float, float]
 _AT_REST: Point = (0.0, 0.0, 0.0)
 
 
+def finite_acceleration_m_s2(given_m_s2: float) -> float:
+    """That acceleration, with which speeds change in some time.
+
+    Raises:
+        ValueError: it is not positive and finite.
+    """
+    if not 0.0 < given_m_s2 < math.inf:
+        raise ValueError(f"acceleration must be positive and finite, not {given_m_s2} m/s²")
+    return given_m_s2
+
+
 def plus(a: Point, b: Point) -> Point:
     """Sum."""
     return a[0] + b[0], a[1] + b[1], a[2] + b[2]
@@ -366,11 +377,7 @@ class SmoothMotion:
         Raises:
             ValueError: it is not positive and finite.
         """
-        if not 0.0 < acceleration_m_s2 < math.inf:
-            raise ValueError(
-                f"acceleration must be positive and finite, not {acceleration_m_s2} m/s²"
-            )
-        self._acceleration_m_s2 = acceleration_m_s2
+        self._acceleration_m_s2 = finite_acceleration_m_s2(acceleration_m_s2)
 
     def _straight_on(
         self, here: Point, velocity: Point, target_enu_m: Point, speed_m_s: float
