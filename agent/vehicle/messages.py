@@ -20,6 +20,10 @@ class LandedState(IntEnum):
     LANDING = 4
 
 
+_RISES_M_S = 0.3
+"""What rises no faster may be hovering."""
+
+
 class AltitudeFrame(IntEnum):
     """Zero of an altitude; the value is the MAV_FRAME without its ``_INT`` twin."""
 
@@ -27,9 +31,6 @@ class AltitudeFrame(IntEnum):
     NONE = 2
     """MAV_FRAME_MISSION: a mission item without a place."""
     HOME = 3
-
-
-_RISES_M_S = 0.3
 
 
 class MissionKind(IntEnum):

@@ -105,9 +105,8 @@ def _leaves(obstacles: Obstacles, here: Point, there: Point) -> bool:
         return False
     out_m = math.dist(obstacles.way_out_m(here_m[0]), here[:2])
     length_m = math.dist(here[:2], there[:2])
-    soon_m = min(
-        length_m, _MORE * out_m + _MORE_M
-    )  # the rest may be as long as hostile input has it
+    # What comes after that may be as long as hostile input has it.
+    soon_m = min(length_m, _MORE * out_m + _MORE_M)
     share = np.linspace(0.0, soon_m, 2 + math.ceil(soon_m / _STEP_M))[:, None] / (length_m or 1.0)
     places_m: FloatArray = here_m + share * (there_m - here_m)
     outside = np.flatnonzero(obstacles.free(places_m))

@@ -20,19 +20,16 @@ class Attempts:
     """Those that the outcomes of one board tell of."""
 
     def __init__(self) -> None:
-        self.in_order: list[tuple[float, int, str, str]] = []
-        """Completion [s], number, task and UAV of each: one after the other, and at one time in
+        self.of_uav: dict[str, list[tuple[float, int, str]]] = {}
+        """By UAV completion [s], number and task of each: one after the other, and at one time in
         board order."""
-        self._of_uav: dict[str, list[tuple[float, int, str]]] = {}
-        """Those of each UAV, in the same order."""
         self._team: TeamState | None = None
         """After all attempts but those of `_moved`, apart from its tasks."""
         self._moved: set[str] = set()
 
     def add(self, completed_s: float, number: int, task: str, uav: str) -> None:
         """One more, which need not be the last one."""
-        insort(self.in_order, (completed_s, number, task, uav))
-        insort(self._of_uav.setdefault(uav, []), (completed_s, number, task))
+        insort(self.of_uav.setdefault(uav, []), (completed_s, number, task))
         self._moved.add(uav)
 
     def team(self, problem: Problem) -> TeamState:
@@ -47,7 +44,7 @@ class Attempts:
             state = self._team = TeamState.at_start(problem)
         for uav in self._moved.intersection(problem.row_of):
             row = problem.row_of[uav]
-            attempted = self._of_uav[uav]
+            attempted = self.of_uav[uav]
             columns = [problem.column_of[task] for _, _, task in attempted]
             state.free_s[row] = attempted[-1][0]
             state.place_enu_m[row] = problem.task_enu_m[columns[-1]]

@@ -8,7 +8,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from agent.core.interface import HandedOver, Home
+from agent.core.interface import GoTo, HandedOver, Home
 from agent.vehicle.activity import FlightPhase
 from agent.vehicle.config import CommandStyle
 from coordinator.operator.commands import RequestResult
@@ -59,11 +59,10 @@ def test_a_zone_drawn_across_a_flown_path_is_flown_round(
     def draw() -> None:
         """A wall across its way, 60 m ahead of it."""
         now_s = fleet.world.queue.now_s()
-        (east_m, north_m, _), (to_m) = (
-            fleet.pilot("u1").position_enu_m(now_s),
-            fleet.books["u1"].ordered[-1][1],
-        )
-        goal_m = to_m.position_enu_m  # type: ignore[union-attr]  # it flies to its first task
+        east_m, north_m, _ = fleet.pilot("u1").position_enu_m(now_s)
+        _, order = fleet.books["u1"].ordered[-1]
+        assert isinstance(order, GoTo), "it flies to its first task"
+        goal_m = order.position_enu_m
         away = np.array([goal_m[0] - east_m, goal_m[1] - north_m])
         along = away / np.linalg.norm(away)
         aside = np.array([-along[1], along[0]])

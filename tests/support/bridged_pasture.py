@@ -122,7 +122,9 @@ class PastureFleet(BridgedFleet):
         self._by_itself = by_itself
         self._let_start: set[str] = set()
         self._stood: set[str] = set()
-        self._moments: list[tuple[str, Callable[[Sent | VehicleReport], bool], float, object]] = []
+        self._moments: list[
+            tuple[str, Callable[[Sent | VehicleReport], bool], float, Callable[[], None]]
+        ] = []
         self.on_said = self._hear
         self.at(_LOOK_S, self._look)
 
@@ -137,7 +139,7 @@ class PastureFleet(BridgedFleet):
         uav: str,
         said: Callable[[Sent | VehicleReport], bool],
         after_s: float,
-        act: Callable[[], object],
+        act: Callable[[], None],
     ) -> None:
         """Do that so long after that UAV's bridge has first said such a thing."""
         self._moments.append((uav, said, after_s, act))
@@ -167,7 +169,7 @@ class PastureFleet(BridgedFleet):
             who, holds, after_s, act = moment
             if who == uav and holds(said):
                 self._moments.remove(moment)
-                self.at(self.world.queue.now_s() + after_s, act)  # type: ignore[arg-type]
+                self.at(self.world.queue.now_s() + after_s, act)
 
     def _look(self) -> None:
         now_s = self.world.queue.now_s()

@@ -276,7 +276,7 @@ def test_equal_registers_give_equal_boards_whatever_order_they_came_in(seed: int
 
         assert list(other.replica.messages()) == list(first.replica.messages())
         assert other.states == first.states
-        assert (other.open, other.attempts.in_order) == (first.open, first.attempts.in_order)
+        assert (other.open, other.attempts.of_uav) == (first.open, first.attempts.of_uav)
         assert other.unfinished == first.unfinished
         assert (other.problem is None) == (first.problem is None)
         if other.problem is not None and first.problem is not None:
