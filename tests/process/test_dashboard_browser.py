@@ -22,15 +22,20 @@ from tests.process.pace import pace
 pytestmark = [pytest.mark.process]
 
 UAVS = ["uav1", "uav2", "uav3"]
-SIDE = 18
-"""Tasks in a row, and rows of them: enough that none but an abort ends the mission, which would
-take three minutes otherwise."""
+SIDE = 12
+"""Tasks in a row, and rows of them: so many, and each so long, that none but an abort ends the
+mission, which would take three minutes otherwise; and so near that the way home is short."""
 MISSION = Mission(
     "watched",
     9000.0,
-    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 1.5) for n, u in enumerate(UAVS)),
+    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 3.0) for n, u in enumerate(UAVS)),
     tuple(
-        Task(TaskId(f"t{n + 1}"), (10.0 * (n % SIDE - 4), 10.0 * (1 + n // SIDE), 0.0), 1.0)
+        Task(
+            TaskId(f"t{n + 1}"),
+            (10.0 * (n % SIDE - 4), 5.0 * (1 + n // SIDE), 0.0),
+            1.0,
+            service_s=12.0,
+        )
         for n in range(SIDE * SIDE)
     ),
     origin=Origin(46.8, 9.7, 1100.0),
@@ -140,11 +145,11 @@ def add_a_task_by_a_click(page: Page) -> str:
 
 
 def draw_a_zone_and_take_it_away(page: Page) -> None:
-    """Aside of everything, by clicks on its corners."""
+    """Beyond everything, by clicks on its corners."""
     page.get_by_role("button", name="+ Zone").click()
     box = page.locator("#map").bounding_box()
     assert box is not None
-    for right, down in ((0.35, 0.80), (0.42, 0.80), (0.38, 0.88)):
+    for right, down in ((0.02, 0.10), (0.07, 0.10), (0.04, 0.18)):
         page.mouse.click(box["x"] + right * box["width"], box["y"] + down * box["height"])
     page.keyboard.press("Enter")
     page.get_by_label("Id", exact=True).fill("pond")
