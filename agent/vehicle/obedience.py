@@ -162,7 +162,9 @@ def go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
         session.report(Refused(order, fault))
         return activity
     if _must_stand_first(activity, order, session):
-        return begin_holding(activity, Hold("to be sent round corners"), session, go_next=order)
+        return begin_holding(
+            activity, Hold("to be sent round corners or zones"), session, go_next=order
+        )
     if isinstance(activity, Holding):
         session.commands.cancel_all()
     flying = Flying(session, session.firmware, order)
@@ -172,11 +174,15 @@ def go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
 
 
 def _must_stand_first(activity: Activity, order: GoTo, session: VehicleSession) -> bool:
-    """Whether it must fly no mission while it is given one.
+    """Whether it must fly no mission while it is given one, nor be turned before it stands.
 
-    It would go on with the item of the same number, which may lie anywhere on the way round.
+    It would go on with the item of the same number, which may lie anywhere on the way round. And
+    what can't brake before a zone is elsewhere by the time that it turns: from there the way may
+    lead through.
     """
     mission, heartbeat, firmware = session.mission, session.vehicle.heartbeat, session.firmware
+    if session.slides_into_zone():
+        return True
     if mission is None or heartbeat is None or firmware is None or isinstance(activity, Holding):
         return False
     in_mission = firmware.is_mission(heartbeat.custom_mode) or mission.may_be_flown

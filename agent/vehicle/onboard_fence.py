@@ -2,11 +2,11 @@
 
 The fence is the last line, behind the agent's own check (agent.vehicle.zone_guard), so nothing
 waits for it longer than a few tries take. It stands on the vehicle while that flies for us, and no
-longer. A zone becomes part of it only once the vehicle is outside: a fence put over a vehicle makes
-it flee at once, or is not heeded. What is no longer a zone is cleared at once, before anything is
-flown through it, and the rest put on anew. A fence that is not ours is left as it is: ours is one
-all of whose polygons are zones that we were told of. What a ground station changes while ours
-stands is not noticed.
+longer. A zone becomes part of it only once the vehicle is outside, and will be when it brakes: a
+fence put over a vehicle makes it flee at once, or is not heeded. What is no longer a zone is
+cleared at once, before anything is flown through it, and the rest put on anew. A fence that is not
+ours is left as it is: ours is one all of whose polygons are zones that we were told of. What a
+ground station changes while ours stands is not noticed.
 
 Of the two kinds of transfers only one is under way at a time, since PX4 knows no more; missions
 go first.
@@ -147,19 +147,22 @@ class OnboardFence:
             self.interrupt()
         self._want(kept)
 
-    def advance(self, place_enu_m: Point | None, home_up_m: float, *, may_begin: bool) -> None:
+    def advance(
+        self, way_enu_m: tuple[Point, Point] | None, home_up_m: float, *, may_begin: bool
+    ) -> None:
         """Put on the vehicle what it should have.
 
         Args:
-            place_enu_m: where it is [m; mission origin]; None: not known.
+            way_enu_m: where it is, and where it would come to a stop [m; mission origin]; None:
+                not known.
             home_up_m: height of its home [m above the mission origin].
             may_begin: whether no other transfer is under way.
         """
         if self._off_by_s is not None:
             self._off_by_s = self._left = None
             self._want(())
-        if place_enu_m is not None and (self._pending or self._included):
-            self._include(np.array([place_enu_m[:2]]), home_up_m)
+        if way_enu_m is not None and (self._pending or self._included):
+            self._include(np.array([place_enu_m[:2] for place_enu_m in way_enu_m]), home_up_m)
         self._carry_on(may_begin=may_begin)
 
     def take_off(self) -> bool:
@@ -269,10 +272,14 @@ class OnboardFence:
         self._failures, self._next_at_s = 0, -math.inf
         self._failure = self._disowned = None
 
-    def _include(self, place_m: FloatArray, home_up_m: float) -> None:
+    def _include(self, way_m: FloatArray, home_up_m: float) -> None:
         """Make zones part of it that the vehicle is outside of, if they lie in every way.
 
         Until they stand on the vehicle it must stay outside.
+
+        Args:
+            way_m: shape (2, 2), begin and end [m; east, north].
+            home_up_m: height of its home [m above the mission origin].
         """
         if self._low_m is None:
             self._low_m = home_up_m + _LOW_M
@@ -284,7 +291,8 @@ class OnboardFence:
             kept, new = self._included, pending
         else:
             kept, new = (), zones
-        wanted = [*kept, *(zone for zone in new if self._zones[zone].free(place_m)[0])]
+        outside = (zone for zone in new if self._zones[zone].clear(way_m[:1], way_m[1:])[0])
+        wanted = [*kept, *outside]
         if wanted != list(self._included):
             self._want(wanted)
             self._pending = tuple(zone for zone in zones if zone not in wanted)

@@ -64,6 +64,11 @@ _ACCELERATION_M_S2 = 2.5
 """Of a vehicle of which neither mission nor parameters tell it: ArduCopter's own."""
 
 
+_HEEDS_S = 2.0
+"""So late at most a vehicle begins to brake for a zone that is new: news of it, the order and the
+place that it tells take their time."""
+
+
 class VehicleSession(Conversation):
     """One vehicle, as far as it is heard; and what was made of it in the step under way."""
 
@@ -219,8 +224,29 @@ class VehicleSession(Conversation):
         home_alt_m = 0.0 if position is None else position.alt_m - position.relative_alt_m
         free = self.mission is None or not self.mission.is_transferring
         home_up_m = home_alt_m - self.config.origin.alt_m
-        fence.advance(self.known_place_m(), home_up_m, may_begin=free)
+        fence.advance(self._braking_way_m(_HEEDS_S), home_up_m, may_begin=free)
         return fence.objection
+
+    def slides_into_zone(self) -> bool:
+        """Whether it is too fast to stop outside of zones."""
+        way_m, position = self._braking_way_m(0.0) if self.guard else None, self.vehicle.position
+        if way_m is None or position is None:
+            return False
+        is_slow = math.hypot(*position.velocity_enu_m_s) <= self.config.arrival_speed_m_s
+        return not is_slow and self.guard.objection(way_m) is not None
+
+    def _braking_way_m(self, heeds_s: float) -> tuple[Point, Point] | None:
+        """From where the vehicle is to where it would stop if it began to brake so late.
+
+        A straight way [m; mission origin]; None: not known.
+        """
+        place_enu_m, position = self.known_place_m(), self.vehicle.position
+        if place_enu_m is None or position is None:
+            return None
+        east_m_s, north_m_s, _ = position.velocity_enu_m_s
+        lasts_s = heeds_s + math.hypot(east_m_s, north_m_s) / (2.0 * self.acceleration_m_s2)
+        east_m, north_m, up_m = place_enu_m
+        return place_enu_m, (east_m + lasts_s * east_m_s, north_m + lasts_s * north_m_s, up_m)
 
     def take_fence_off(self) -> bool:
         """Leave no fence of ours on a vehicle that has landed; whether that is over."""

@@ -54,6 +54,11 @@ class FenceMonitor:
             return ()
         return (behaviour.obstacle,) if self.breached else ()
 
+    @property
+    def area_count(self) -> int:
+        """How many polygons and circles stand on the vehicle."""
+        return len(self._store.fence.areas)
+
     def allows(self, place_enu_m: Point) -> bool:
         """Whether the fence, if it is on, lets the vehicle be there."""
         behaviour = self._pilot.flavour.fence_behaviour
@@ -88,6 +93,8 @@ class FenceMonitor:
         total = items + _STORED_BESIDE if items else 0
         self._pilot.parameter_server.announce("FENCE_TOTAL", float(total))
         self.breached = False
+        if self._check_s is not None:
+            self._check_s = now_s + _CHECK_S  # nobody has looked while there was none
         self._look(now_s, acts=self._pilot.armed and not self._pilot.flight.on_ground)
         added = self._pilot.flavour.fence_behaviour.inclusions_add
         home_m = self._pilot.flight.home_enu_m[:2]

@@ -7,6 +7,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+import shapely
 
 from agent.core.interface import GoTo, HandedOver, Home
 from agent.vehicle.activity import FlightPhase
@@ -32,6 +33,8 @@ from tests.support.fake_copter import ARM
 from tests.support.seeds import seeds
 
 LIMIT_S = 900.0
+FLED_S = 25
+"""By then a UAV has left a zone that was drawn over it, and has it as its fence [s]."""
 ENDURANCE_S = 155.0
 TASKS = {f"t{number}" for number in range(len(PLACES))}
 
@@ -48,39 +51,70 @@ def assert_all_done(fleet: PastureFleet) -> None:
     fleet.assert_safe()
 
 
+def draw_a_wall(fleet: PastureFleet, ahead_m: float) -> Zone:
+    """Across the way of u1, so far ahead of it; nobody is forbidden to be there yet."""
+    now_s = fleet.world.queue.now_s()
+    east_m, north_m, _ = fleet.pilot("u1").position_enu_m(now_s)
+    _, order = fleet.books["u1"].ordered[-1]
+    assert isinstance(order, GoTo), "it flies to its first task"
+    goal_m = order.position_enu_m
+    away = np.array([goal_m[0] - east_m, goal_m[1] - north_m])
+    along = away / np.linalg.norm(away)
+    aside = np.array([-along[1], along[0]])
+    here = np.array([east_m, north_m])
+    corners = [
+        here + (ahead_m + beyond_m) * along + side_m * aside
+        for beyond_m, side_m in ((0, -40), (0, 40), (15, 40), (15, -40))
+    ]
+    polygon = tuple((float(east), float(north)) for east, north in corners)
+    fleet.want(now_s, NewZone("wall", polygon))
+    return Zone(ZoneId("wall"), polygon)
+
+
 @ONE_DIAGONAL
 def test_a_zone_drawn_across_a_flown_path_is_flown_round(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
     """Far enough ahead: to brake for it takes its way."""
     fleet = PastureFleet(flavour, style, mission=pasture(300.0))
-    drawn: list[float] = []
-
-    def draw() -> None:
-        """A wall across its way, 60 m ahead of it."""
-        now_s = fleet.world.queue.now_s()
-        east_m, north_m, _ = fleet.pilot("u1").position_enu_m(now_s)
-        _, order = fleet.books["u1"].ordered[-1]
-        assert isinstance(order, GoTo), "it flies to its first task"
-        goal_m = order.position_enu_m
-        away = np.array([goal_m[0] - east_m, goal_m[1] - north_m])
-        along = away / np.linalg.norm(away)
-        aside = np.array([-along[1], along[0]])
-        here = np.array([east_m, north_m])
-        corners = [
-            here + ahead_m * along + side_m * aside
-            for ahead_m, side_m in ((60, -40), (60, 40), (75, 40), (75, -40))
-        ]
-        polygon = tuple((float(east), float(north)) for east, north in corners)
-        drawn.append(now_s)
-        fleet.zones.append(Zone(ZoneId("wall"), polygon))
-        fleet.want(now_s, NewZone("wall", polygon))
-
-    fleet.once("u1", in_phase(FlightPhase.FLYING), 2.0, draw)
+    fleet.once(
+        "u1", in_phase(FlightPhase.FLYING), 2.0, lambda: fleet.zones.append(draw_a_wall(fleet, 60))
+    )
     fleet.fly(LIMIT_S)
 
-    assert drawn
+    assert [zone.id for zone in fleet.zones] == ["herd", "wall"]
     assert [seat.verdict and seat.verdict.result for seat in fleet.seats] == [RequestResult.OBEYED]
+    assert_all_done(fleet)
+
+
+@OTHER_DIAGONAL
+@pytest.mark.parametrize("ahead_m", [2.0, 8.0, 14.0])
+def test_a_zone_drawn_nearer_than_a_uav_can_brake_is_its_fence_once_it_is_outside(
+    flavour: FirmwareModelName, style: CommandStyle, ahead_m: float
+) -> None:
+    """It slides in, and leaves by the shortest way; its own fence does not take it from us."""
+    fleet = PastureFleet(flavour, style, mission=pasture(300.0))
+    inside: list[bool] = []
+    areas: list[int] = []
+
+    def draw() -> None:
+        wall = draw_a_wall(fleet, ahead_m).shape()
+
+        def look() -> None:
+            pilot = fleet.pilot("u1")
+            here_m = pilot.position_enu_m(fleet.world.queue.now_s())[:2]
+            inside.append(wall.contains(shapely.Point(here_m)))
+            areas.append(pilot.fence.area_count)
+
+        for later_s in range(FLED_S):
+            fleet.at(fleet.world.queue.now_s() + later_s, look)
+
+    fleet.once("u1", in_phase(FlightPhase.FLYING), 4.0, draw)
+    fleet.fly(LIMIT_S)
+
+    assert any(inside), "it could not brake"
+    assert not inside[-1]
+    assert (areas[0], areas[-1]) == (1, 2), areas
     assert_all_done(fleet)
 
 

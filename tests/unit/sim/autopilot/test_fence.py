@@ -223,6 +223,25 @@ def test_px4_ignores_targets_beyond_and_holds_where_it_breaks_the_fence() -> Non
     assert only(ground.heard, "HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_ACTIVE
 
 
+def test_a_fence_put_over_a_place_that_is_passed_concerns_nobody() -> None:
+    ground = ground_station(Px4Model())
+    ground.wait(5.0)
+    ground.set_mode(*HOLD)
+    ground.arm()
+    ground.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 498.0)
+    ground.wait(12.0)
+    fly_px4(ground, 50.0)
+    ground.wait(15.0)
+    fly_px4(ground, 150.0)
+    ground.wait(5.0)
+    assert ground.position_enu_m[1] > 65.0
+    assert upload(ground, corners((OUTSIDE, VILLAGE))) == ACCEPTED
+    ground.wait(15.0)
+
+    assert ground.position_enu_m[1] == pytest.approx(150.0, abs=0.5)
+    assert "Failsafe activated\t" not in ground.texts()
+
+
 def test_px4_takes_a_fence_around_its_home_for_none() -> None:
     ground = flying_px4((OUTSIDE, HERE))
 
