@@ -1,6 +1,7 @@
 #include "field_list.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace peckorder {
@@ -9,6 +10,7 @@ namespace {
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 constexpr int kMostLabels = 16;
 constexpr int kMostBases = 4;  // between two tasks; those of the earliest arrival that help
+constexpr double kRounding = 1e-9;  // sums in another order must not refuse more
 
 // Put `label` among those after the same tasks, unless one of them makes it needless. That is not
 // exact where a battery is swapped later: who departs from a base earlier may have to wait longer in
@@ -43,19 +45,6 @@ void keep(std::vector<ListLabel>& labels, const ListLabel& label) {
     labels.push_back(label);
 }
 
-// Its times and value, but for where it is on a list.
-OnList on_list(const FieldProblem& problem, int uav, int task) {
-    OnList on{};
-    on.work_s = problem.line_time_s(uav, item_of_task(task, 0));
-    if (problem.is_line[task])
-        on.work_s = std::min(on.work_s, problem.line_time_s(uav, item_of_task(task, 1)));
-    on.work_s += problem.service_s[task];
-    on.opens_s = problem.opens_s[task];
-    on.last_s = std::min(problem.closes_s[task], problem.due_s[task] - on.work_s);
-    on.until_s = problem.until_s[task];
-    return on;
-}
-
 void prefetch(const double* place) {
 #if defined(__GNUC__)
     __builtin_prefetch(place);
@@ -64,13 +53,6 @@ void prefetch(const double* place) {
 #endif
 }
 
-// Of the labels after so many tasks.
-double earliest_s(const FieldList& list, std::size_t count) {
-    double time_s = kInfinity;
-    for (int k = list.offsets[count]; k < list.offsets[count + 1]; ++k)
-        time_s = std::min(time_s, list.labels[k].progress.time_s);
-    return time_s;
-}
 }  // namespace
 
 double Stays::begin_s(int base, int uav, double arrive_s) const {
@@ -270,91 +252,45 @@ void ListSolver::fetch(const FieldList& list, int task) const {
     }
 }
 
-double ListSolver::least_leg_s(int uav, int from, int to) const {
-    double least_s = kInfinity;
-    for (int way = 0; way <= problem_.is_line[from]; ++way) {
-        const double* legs_s =
-            problem_.legs_from(uav, problem_.leave_node(item_of_task(from, way)));
-        for (int on = 0; on <= problem_.is_line[to]; ++on)
-            least_s = std::min(least_s, legs_s[problem_.enter_node(item_of_task(to, on))]);
-    }
-    return least_s;
-}
-
-void ListSolver::learn(FieldList& list) const {
-    if (list.known == list.version) return;
-    list.known = list.version;
-    const std::size_t count = list.order.size();
-    list.on.resize(count);
-    double rest = 0.0;
-    for (std::size_t k = count; k-- > 0;) {
-        const int task = task_of(list.order[k]);
-        OnList& on = list.on[k];
-        on = on_list(problem_, list.uav, task);
-        on.step_s = k == 0 ? 0.0 : least_leg_s(list.uav, task_of(list.order[k - 1]), task);
-        on.end_s = earliest_s(list, k + 1);
-        on.share = list.labels[list.offsets[k]].progress.survived *
-                   problem_.weight[problem_.at(list.uav, task)];
-        rest += on.share * (on.until_s - on.end_s);
-        on.rest = rest;
-    }
-}
-
-// What the tasks from number `from` on can be worth at most if the first one of them is flown to
-// so that it could begin at `time_s`, the chance to survive until then being so much less.
-double ListSolver::most_value(const FieldList& list, std::size_t from, double time_s,
-                              double survival) const {
-    double value = 0.0;
-    for (std::size_t k = from; k < list.order.size(); ++k) {
-        const OnList& on = list.on[k];
-        if (k > from) time_s += on.step_s;
-        const double begin_s = std::max(time_s, on.opens_s);
-        if (begin_s > on.last_s + kToleranceS) return -kInfinity;
-        time_s = begin_s + on.work_s;
-        if (time_s <= on.end_s) return value + survival * on.rest;
-        value += survival * on.share * (on.until_s - time_s);
-    }
-    return value;
-}
-
-// At most so much is the list worth with `task` at that place; -infinity: it can't be done there.
-double ListSolver::most_with(const FieldList& list, std::size_t place, int task) const {
-    const std::size_t pair = problem_.at(list.uav, task);
-    const OnList on = on_list(problem_, list.uav, task);
-    const int first = list.offsets[place], last = list.offsets[place + 1];
-    double begin_s = kInfinity, value = -kInfinity;
-    for (int k = first; k < last; ++k) {
-        const Progress& progress = list.labels[k].progress;
-        double leg_s = kInfinity;
-        for (int way = 0; way <= problem_.is_line[task]; ++way)
-            leg_s = std::min(leg_s, progress.legs_s[problem_.enter_node(item_of_task(task, way))]);
-        begin_s = std::min(begin_s, progress.time_s + leg_s);
-        value = std::max(value, progress.value);
-    }
-    begin_s = std::max(begin_s, on.opens_s);
-    if (begin_s > on.last_s + kToleranceS) return -kInfinity;
-    const double end_s = begin_s + on.work_s;
-    value += list.labels[first].progress.survived * problem_.weight[pair] * (on.until_s - end_s);
-    if (place == list.order.size()) return value;
-    const double next_s = end_s + least_leg_s(list.uav, task, task_of(list.order[place]));
-    return value + most_value(list, place, next_s, problem_.survival[pair]);
-}
-
 // The value with `task` at that place if it is above `least`; else -infinity.
 double ListSolver::value_with(const FieldList& list, const Stays& stays, std::size_t place,
                               int task, double least, bool& meets_slots) {
-    const int first = list.offsets[place];
+    const int first = list.offsets[place], last = list.offsets[place + 1];
     const double survival = problem_.survival[problem_.at(list.uav, task)];
-    extend(list.uav, stays, list.labels.data() + first, list.offsets[place + 1] - first, task,
-           here_, meets_slots);
+    const bool charged = list.is_charged;
+    from_.assign(list.labels.begin() + first, list.labels.begin() + last);
+    if (charged) {
+        most_charged_with(list, place, task);
+        std::size_t hopeful = 0;
+        for (std::size_t k = 0; k < from_.size(); ++k)
+            if (bound_[k] > least) from_[hopeful++] = from_[k];
+        from_.resize(hopeful);
+    }
+    extend(list.uav, stays, from_.data(), static_cast<int>(from_.size()), task, here_, meets_slots);
+    if (charged && list.is_charged_exact) {
+        double most = -kInfinity;
+        for (const ListLabel& label : here_) {
+            const double rest = most_from(list, place, label.progress);
+            most = std::max(most, label.progress.value + survival * rest);
+        }
+        return most > least ? most : -kInfinity;
+    }
     for (std::size_t k = place; k < list.order.size(); ++k) {
         const int next = task_of(list.order[k]);
         const double step_s = k == place ? least_leg_s(list.uav, task, next) : list.on[k].step_s;
         int hopeful = 0;
         for (const ListLabel& label : here_) {
             const Progress& now = label.progress;
-            if (now.value + most_value(list, k, now.time_s + step_s, survival) > least)
-                here_[hopeful++] = label;
+            if (!(now.value + most_value(list, k, now.time_s + step_s, survival) > least)) continue;
+            if (charged) {
+                const double most =
+                    k == place ? most_from(list, k, now)
+                               : most_after(list, k - 1, label.item, charge_s(list.uav, now)) -
+                                     list.on[k].slope * now.time_s;
+                const double value = now.value + survival * most;
+                if (!(value + kRounding * (std::abs(value) + 1.0) > least)) continue;
+            }
+            here_[hopeful++] = label;
         }
         if (hopeful == 0) return -kInfinity;
         extend(list.uav, stays, here_.data(), hopeful, next, next_, meets_slots);

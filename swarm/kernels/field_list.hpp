@@ -75,6 +75,14 @@ struct OnList {
     double opens_s, last_s;  // within these its work begins
     double share, until_s;   // its value is share * (until_s - end)
     double rest;       // the most that it and those after it are worth
+    double slope;      // so much less they are worth for each second that they come later
+};
+
+// What the tasks after one on a list can be worth with what is left of the battery after it: if that
+// lasts `need_s` and the time is t, at most `gain` less the slope times t. Windows, due times and
+// slots are left out of account, which only make them worth less.
+struct Charged {
+    double need_s, gain;
 };
 
 struct FieldList {
@@ -89,6 +97,14 @@ struct FieldList {
     std::uint64_t stays_version = 0;
     std::vector<OnList> on;     // by task, if `known` is `version`
     std::uint64_t known = 0;
+    // The same where batteries are swapped: after each task, in each direction, less need and gain
+    // first; and from each base, to each task with those after it.
+    std::vector<Charged> charged;
+    std::vector<int> charged_offsets;
+    std::vector<double> from_base;
+    std::vector<double> rest;   // of each label: at most so much more it comes to
+    bool is_charged = false;    // whether that is known
+    bool is_charged_exact = false;  // whether they are worth just that
 };
 
 // What a task gains at a place of a list.
@@ -112,7 +128,8 @@ class ListSolver {
           team_(team),
           last_version_(last_version),
           ready_(problem.n_base),
-          before_(problem.n_base) {}
+          before_(problem.n_base),
+          hops_s_(static_cast<std::size_t>(problem.n_base) * problem.n_base) {}
 
     // Work out labels and items of the first `kept` tasks' successors anew; false: the order can't
     // be done, and then the list holds no items. While `overlooks` > 0, a swap is overlooked with
@@ -149,10 +166,28 @@ class ListSolver {
         return problem_.n_base > 0 && std::isfinite(problem_.full_s[uav]) &&
                problem_.full_s[uav] > 0.0;
     }
-    void learn(FieldList& list) const;
+    void learn(FieldList& list);
+    double most_charged_with(const FieldList& list, std::size_t place, int task);
+    double longer_s(const FieldList& list, std::size_t to, const double* from_s,
+                    const double* than_s) const;
+    bool is_free(const FieldList& list) const;
+    void learn_hops(int uav);
+    void learn_charged(FieldList& list);
+    const Charged* charged_of(const FieldList& list, std::size_t number, int way,
+                              const Charged*& end) const;
+    template <typename Take>
+    void for_each_charged(const FieldList& list, std::size_t to, const double* legs_s,
+                          Take take) const;
+    double most_unswapped(const FieldList& list, std::size_t to, const double* legs_s,
+                          double charge_s) const;
+    double most_after(const FieldList& list, std::size_t number, Item item, double charge_s) const;
+    double most_from(const FieldList& list, std::size_t from, const Progress& now) const;
+    double charge_s(int uav, const Progress& now) const {
+        return now.landed ? problem_.full_s[uav] : now.sortie_end_s - now.time_s;
+    }
     double least_leg_s(int uav, int from, int to) const;
     double most_value(const FieldList& list, std::size_t from, double time_s, double survival) const;
-    double most_with(const FieldList& list, std::size_t place, int task) const;
+    double most_with(const FieldList& list, std::size_t place, int task);
     double value_with(const FieldList& list, const Stays& stays, std::size_t place, int task,
                       double least, bool& meets_slots);
     void extend(int uav, const Stays& stays, const ListLabel* from, int count, int task,
@@ -171,6 +206,13 @@ class ListSolver {
     std::vector<int> before_;      // the base before that one; -1: none, -2: can't be reached
     std::vector<ListLabel> here_, next_;
     std::vector<ItemInsertion> bounds_;
+    std::vector<double> hops_s_;     // (n_base, n_base) from being ready at a base to another one
+    int hops_kind_ = -1;             // for UAVs of that kind, with
+    double hops_full_s_ = 0.0;       // such batteries
+    std::vector<double> unswapped_;
+    std::vector<Charged> steps_;
+    std::vector<double> bound_;     // of each label at a place
+    std::vector<ListLabel> from_;
     Random* random_ = nullptr;
     double overlooks_ = 0.0;
     FieldList before_refresh_;

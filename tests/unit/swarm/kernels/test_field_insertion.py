@@ -15,6 +15,7 @@ from swarm.kernels.field import (
     run_rule,
 )
 from swarm.kernels.field_insertion import best_insertions
+from swarm.kernels.field_search import optimise_lists
 
 
 def problem_of(seed: int, shape: FieldShape) -> FieldProblem:
@@ -61,6 +62,46 @@ def test_a_battery_is_swapped_where_a_list_needs_it() -> None:
 
     flown = fly_lists(problem.kernel, state, [[2 * task for task in path], [], []])
     assert not flown.feasible  # not on one battery
+
+
+LONG = {
+    "batteries alone": FieldShape(endurance_frac=0.2, bases=2, slots=0, lines_frac=0.5),
+    "windows": FieldShape(endurance_frac=0.2, bases=2, slots=0, windows_frac=0.3, due_frac=0.2),
+    "slots": FieldShape(endurance_frac=0.2, bases=1, slots=1, lines_frac=0.3),
+}
+
+
+@pytest.mark.parametrize("name", LONG)
+@pytest.mark.parametrize("seed", [0, 1, 3, 4])
+def test_a_long_list_that_swaps_takes_a_task_where_it_is_worth_most(name: str, seed: int) -> None:
+    """Its places are bounded by the battery; none that is better is passed over."""
+    mission = random_field_mission(2, 30, seed, LONG[name], "drawn")
+    problem = FieldProblem.from_mission(mission)
+    state = FieldState.at_start(problem)
+
+    def solved(order: list[int]) -> tuple[float, list[int]]:
+        lists = [[2 * task for task in order], []]
+        found = optimise_lists(problem.kernel, state, iterations=0, lists=lists, threads=1)
+        kept = [item >> 1 for item in found.lists[0] if item >= 0]
+        return (found.objective if len(kept) == len(order) else -np.inf), list(found.lists[0])
+
+    start = optimise_lists(problem.kernel, state, seed=seed, iterations=400, threads=1)
+    path = [item >> 1 for item in start.lists[0] if item >= 0]
+    path.pop(len(path) // 2)  # one that it could certainly take
+    before, items = solved(path)
+    assert len(path) > 7
+    assert any(item < 0 for item in items)
+    wanted = np.ones(problem.n_task, dtype=np.bool_)
+    wanted[path] = False
+
+    gains, places = best_insertions(problem.kernel, state, 0, path, wanted)
+
+    for task in np.flatnonzero(wanted).tolist()[:6]:
+        tried = [solved([*path[:k], task, *path[k:]])[0] - before for k in range(len(path) + 1)]
+        if max(tried) == -np.inf:
+            continue
+        assert gains[task] >= max(tried) - 1e-6 * abs(before)
+        assert tried[places[task]] == pytest.approx(gains[task], abs=1e-6 * abs(before))
 
 
 @pytest.mark.parametrize("rule", [FIELD_NEAREST, FIELD_VALUE_PER_TIME])
