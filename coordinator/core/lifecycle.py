@@ -15,6 +15,7 @@ from enum import Enum
 from coordinator.planner.online import EpochPolicy, ReplanResult, Situation
 from swarm.model import Mission, Plan, Uav, UavId
 from swarm.model.layers import FlightLayers
+from swarm.model.plan import by_reason
 from swarm.protocol.board import TaskBoard, TaskState, anything_doable, is_of_field, mission_of
 from swarm.protocol.calibration import FlightRates, flight_rates, noticeably_otherwise
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
@@ -256,7 +257,10 @@ class StartGate:
         sequence = () if self.plan is None else self.plan.sequence or ()
         lists = {} if self.plan is None else self.plan.routes
         routes = {str(uav): tuple(map(str, tasks)) for uav, tasks in lists.items()}
-        return PlanEpoch(1, phase, self._method, tuple(sequence), 0.0, reason[:200], routes)
+        left_out = {} if self.plan is None else by_reason(self.plan.left_out)
+        return PlanEpoch(
+            1, phase, self._method, tuple(sequence), 0.0, reason[:200], routes, left_out
+        )
 
     @property
     def completion_s(self) -> dict[str, float]:

@@ -7,14 +7,21 @@ the situation of now, so a reason that comes at a bad moment is not forgotten.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
 from coordinator.core.lifecycle import CoordinatorAction, Replan, Replanned, StopPlanning
 from coordinator.mission_view.wording import listed
-from coordinator.planner.online import EpochPolicy, Situation, complete_lists, worth_to_go
+from coordinator.planner.online import (
+    EpochPolicy,
+    Situation,
+    complete_lists,
+    left_out_by,
+    worth_to_go,
+)
+from swarm.model.plan import LeftOut
 from swarm.protocol.calibration import noticeably_otherwise
-from swarm.protocol.events import LogLine
 from swarm.protocol.messages import PlanEpoch
 
 MARGIN_FRAC = 0.005
@@ -74,20 +81,26 @@ class ReplanPolicy:
 
     def pursue(
         self, situation: Callable[[], Situation | None], epoch: PlanEpoch, now_s: float
-    ) -> list[CoordinatorAction]:
-        """Have a plan made if one is `wanted`; to tell the ``situation`` takes a while."""
-        if self.is_quiet(now_s) or (found := situation()) is None:
-            return []
-        wanted = self.wanted(found, epoch, now_s)
-        return [wanted, LogLine("plans the rest", {"because": wanted.reason})] if wanted else []
+    ) -> Replan | PlanEpoch | None:
+        """What follows from the ``situation``, if anything; to tell it takes a while.
 
-    def wanted(self, situation: Situation, epoch: PlanEpoch, now_s: float) -> Replan | None:
+        A plan that is wanted; where nothing is left to plan, the epoch in force as it leaves
+        out what nobody can do any more, if it does not say so already.
+        """
+        if self.is_quiet(now_s) or (found := situation()) is None:
+            return None
+        if not found.is_settled:
+            return self._wanted(found, epoch, now_s)
+        if not found.taking_part:  # they may come back
+            return None
+        beyond = {LeftOut.NOBODY_CAN.value: found.open_tasks} if found.open_tasks else {}
+        return _leaving_out(epoch, beyond, now_s=found.now_s)
+
+    def _wanted(self, situation: Situation, epoch: PlanEpoch, now_s: float) -> Replan | None:
         """The plan that is wanted, if any; its answer goes to `judge`.
 
         One that is under way is superseded by it.
         """
-        if self.is_quiet(now_s) or situation.is_settled:
-            return None
         running = self._under_way
         if running is not None and not _happened(running.situation, situation):
             return None
@@ -122,9 +135,11 @@ class ReplanPolicy:
     def judge(
         self, replanned: Replanned, situation: Situation, epoch: PlanEpoch, now_s: float
     ) -> PlanEpoch | None:
-        """The next epoch; None if that plan is not wanted any more or hardly better than going on.
+        """The epoch to say; None if that plan is not wanted any more or nothing follows from it.
 
-        Both are valued from ``situation``, which is the one of now and not of when planning began.
+        The next one if the plan is better than going on; else the one in force, if it leaves out
+        other tasks than it says. Both are valued from ``situation``, which is the one of now and
+        not of when planning began.
         """
         wanted, plan = self._under_way, replanned.plan
         if wanted is None or replanned.request != wanted.request:
@@ -139,7 +154,8 @@ class ReplanPolicy:
         self._under_way, self._answered = None, wanted.situation
         self._expected_s = new.completion_s if adopted else old.completion_s
         if not adopted:
-            return None
+            left_out = left_out_by(wanted.situation, old.lists)
+            return _leaving_out(epoch, left_out, now_s=situation.now_s)
         self._quiet_until_s = now_s + self._interval_s
         why = f": worth {new_worth:.4g} instead of {old_worth:.4g} value·s"
         if new_left != old_left:
@@ -152,6 +168,7 @@ class ReplanPolicy:
             mission_s=situation.now_s,
             reason=wanted.reason[: 200 - len(why)] + why,
             routes=complete_lists(situation, new.lists),
+            left_out=left_out_by(wanted.situation, new.lists),
         )
 
     def next_deadline_s(self) -> float | None:
@@ -181,6 +198,19 @@ class ReplanPolicy:
             if task in self._expected_s
         ]
         return float(np.mean(late_s)) / left_s if late_s else 0.0
+
+
+def _leaving_out(
+    epoch: PlanEpoch, left_out: Mapping[str, tuple[str, ...]], *, now_s: float
+) -> PlanEpoch | None:
+    """The same epoch as it leaves out these tasks; None if it says so already."""
+    if _as_sets(left_out) == _as_sets(epoch.left_out):
+        return None
+    return replace(epoch, left_out=left_out, mission_s=now_s)
+
+
+def _as_sets(left_out: Mapping[str, tuple[str, ...]]) -> dict[str, frozenset[str]]:
+    return {why: frozenset(tasks) for why, tasks in left_out.items()}
 
 
 def _happened(before: Situation, now: Situation) -> list[str]:

@@ -17,21 +17,25 @@ from typing import Final
 from coordinator.core.lifecycle import (
     CoordinatorAction,
     MissionEndCondition,
+    Replan,
     Replanned,
     StartDecision,
     StartGate,
 )
 from coordinator.core.publication import RegisterAnnouncer, exit_status, last_epoch
 from coordinator.core.replan_policy import ReplanPolicy
+from coordinator.mission_view.wording import left_out_in_words
 from coordinator.planner.online import Situation
 from swarm.model import Mission
 from swarm.protocol.board import TaskBoard
 from swarm.protocol.events import Finish, LogLine
 from swarm.protocol.membership import Membership
-from swarm.protocol.messages import MissionPhase
+from swarm.protocol.messages import MissionPhase, PlanEpoch
 from swarm.protocol.operator_commands import abort_command, describe_command
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
+
+_TASKS_LOGGED = 8
 
 
 class MissionStage(Enum):
@@ -159,7 +163,13 @@ class StagedMission:
                 actions += self.end(reason, now_s)
         epoch = self._replica.epoch
         if self.stage is MissionStage.RUNNING and epoch is not None:
-            actions += self.replan_policy.pursue(lambda: self._situation(now_s), epoch, now_s)
+            match self.replan_policy.pursue(lambda: self._situation(now_s), epoch, now_s):
+                case Replan() as wanted:
+                    actions += [wanted, LogLine("plans the rest", {"because": wanted.reason})]
+                case PlanEpoch() as changed:
+                    actions += self._say_epoch(changed)
+                case None:
+                    pass
         if not self.is_over:
             actions += self._announcer.repeat(now_s)
         return actions
@@ -192,17 +202,17 @@ class StagedMission:
         return actions
 
     def judge(self, replanned: Replanned, now_s: float) -> list[CoordinatorAction]:
-        """A plan of the rest has been made: say it if it is better than going on."""
+        """A plan of the rest has been made: say it if it is better than going on, or what is left
+        out without it.
+        """
         epoch, situation = self._replica.epoch, None
         if self.stage is MissionStage.RUNNING:
             situation = self._situation(now_s)
         if epoch is None or situation is None:
             self.replan_policy.drop()
             return []
-        better = self.replan_policy.judge(replanned, situation, epoch, now_s)
-        if better is None:
-            return []
-        return [self._announcer.say(better), LogLine("another epoch", {"because": better.reason})]
+        following = self.replan_policy.judge(replanned, situation, epoch, now_s)
+        return [] if following is None else self._say_epoch(following)
 
     def end(self, reason: str, now_s: float) -> list[CoordinatorAction]:
         """The mission is over, unless it is already."""
@@ -240,6 +250,14 @@ class StagedMission:
         self.end_condition.settle()
         self._leave_at_s = now_s + self._timing.linger_s
         return self.replan_policy.stop()
+
+    def _say_epoch(self, epoch: PlanEpoch) -> list[CoordinatorAction]:
+        """Say another epoch, or the one in force with what it leaves out by now."""
+        before, said = self._replica.epoch, self._announcer.say(epoch)
+        if before is None or before.number != epoch.number:
+            return [said, LogLine("another epoch", {"because": epoch.reason})]
+        tasks = left_out_in_words(epoch.why_left_out, _TASKS_LOGGED)
+        return [said, LogLine("leaves out other tasks", {"tasks": tasks or "none"})]
 
     def _start_if_ready(self, now_s: float) -> list[CoordinatorAction]:
         verdict, actions = self.gate.advance(now_s)

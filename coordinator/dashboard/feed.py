@@ -18,9 +18,14 @@ from coordinator.dashboard.rows import AppendOnlyTable, RowTable, as_text
 from coordinator.dashboard.source import DashboardSource
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import Progress, progress_of
-from coordinator.mission_view.scene import TAKEN, task_stands
+from coordinator.mission_view.scene import LEFT_OUT, TAKEN, task_stands
 from coordinator.mission_view.uav_state import LOST, FleetStates, UavState
-from coordinator.mission_view.wording import clean, short_names, visit_reason_in_words
+from coordinator.mission_view.wording import (
+    clean,
+    short_names,
+    visit_reason_in_words,
+    why_left_out,
+)
 from swarm.allocation.problem import Problem
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskState
@@ -213,7 +218,7 @@ class Feed:
     def _head_of(self, mission_state: MissionState | None, now_s: float) -> dict[str, object]:
         head: dict[str, object] = {"mission_s": None, "phase": None, "link": self._source.link}
         epoch = plan = None
-        counts = dict.fromkeys((TaskState.OPEN.value, TAKEN, *list(TaskState)[1:]), 0)
+        counts = dict.fromkeys((TaskState.OPEN.value, TAKEN, LEFT_OUT, *list(TaskState)[1:]), 0)
         dropped = Counter[str]()
         present = set[str]()
         if mission_state is not None and mission_state.replica.brief is not None:
@@ -272,12 +277,12 @@ class Feed:
             self._look_at_progress(problem, mission_state)
             self._progress_version = version
         completed = {} if self._progress is None else self._progress.completed
-        holders = mission_state.holders
+        holders, left_out = mission_state.holders, mission_state.left_out
         for task, state in board.states.items():
             holder = holders.get(task)
             done = completed.get(task)
-            taken = holder is not None
-            counts[task_stands(state, taken=taken)] += 1
+            taken, why = holder is not None, left_out.get(task)
+            counts[task_stands(state, taken=taken, left_out=why is not None)] += 1
             entry = replica.board[task]
             self._tasks.put(
                 task,
@@ -294,6 +299,8 @@ class Feed:
                     "height_m": entry.height_m,
                     "state": state,
                     "taken": taken,
+                    "left_out": why,
+                    "why": None if why is None else why_left_out(why),
                     "uav": holder if done is None else done[0],
                     "completed_s": None if done is None else _rounded(done[1], 3),
                     "by": "scenario" if replica.ordered(task) is None else "operator",

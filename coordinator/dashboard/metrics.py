@@ -113,6 +113,9 @@ class Metrics(Collector):
         states = Counter(mission_state.board.states.values())
         tasks = by("state", ((state, states[state]) for state in TaskState))
         yield _gauge("tasks", "Tasks on the board, by state.", *tasks)
+        reasons = Counter(mission_state.left_out.values())
+        text = "Open tasks that the plan leaves out, by why."
+        yield _gauge("tasks_left_out", text, *by("reason", sorted(reasons.items())))
 
     def _of_uavs(self, mission_state: MissionState, brief: MissionConfig) -> Iterator[Metric]:
         progress, speedup = self._hub.feed.progress, self._source.speedup

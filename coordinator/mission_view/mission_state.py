@@ -244,6 +244,23 @@ class MissionState:
         states = self.board.states
         return {t: u for t, u in holders(claims).items() if states.get(t) is TaskState.OPEN}
 
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Open tasks that the plan in force leaves out and that nobody has taken, each with why."""
+        epoch, plan = self.replica.epoch, self.plan
+        if epoch is not None:
+            why = epoch.why_left_out
+        else:
+            why = {} if plan is None else {str(t): w.value for t, w in plan.left_out.items()}
+        if not why:
+            return {}
+        states, taken = self.board.states, self.holders
+        return {
+            task: reason
+            for task, reason in why.items()
+            if states.get(task, TaskState.OPEN) is TaskState.OPEN and task not in taken
+        }
+
     def executed_schedule(self) -> Schedule:
         """Every UAV's list as it has flown it, as far as it is known."""
         return self.flights.executed_schedule(self.mission, self.board.field_problem)
@@ -357,10 +374,12 @@ class MissionState:
         course = epoch.number, epoch.rule, epoch.sequence, lists
         if epoch.phase is MissionPhase.RUNNING:
             self._clock.hear(epoch.mission_s, now_s)
-        if epoch.phase is MissionPhase.RUNNING and course not in self._epochs:
-            self._epochs.append(course)
-            self._epochs_heard += 1
-            self._narrator.epoch(epoch, now_s)
+        if epoch.phase is MissionPhase.RUNNING:
+            if course not in self._epochs:
+                self._epochs.append(course)
+                self._epochs_heard += 1
+                self._narrator.epoch(epoch, now_s)
+            self._narrator.left_out(epoch, now_s)
         elif epoch.phase is MissionPhase.ENDED and not self._end_heard:
             self._end_heard = True
             self._asking.want(now_s)  # soon nobody will be there to tell what was not heard

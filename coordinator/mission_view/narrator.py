@@ -18,10 +18,12 @@ from coordinator.mission_view.wording import (
     counted,
     entry_in_words,
     goal_in_words,
+    left_out_in_words,
     listed,
     order_in_words,
     rates_in_words,
     visit_in_words,
+    why_left_out,
     zone_in_words,
 )
 from swarm.model import Mission
@@ -104,6 +106,8 @@ class MissionNarrator:
         """What was told last of each UAV's vehicle."""
         self._orphans: dict[str, tuple[str, float]] = {}
         """Task -> UAV that was lost on its way to it, and when."""
+        self._left_out: dict[str, str] = {}
+        """By task that the epoch in force leaves out, why."""
 
     def tell(
         self,
@@ -270,9 +274,9 @@ class MissionNarrator:
                     self._left.add(uav)
                 self.tell(kind, f"{uav} {how}{because(note)}", now_s, uavs=[uav])
         elif phase in _IN_FLIGHT and note and note != self._remarks.get(uav):
-            self._remarks[uav] = note
             if self._is_routine(note):
-                return
+                return  # and what was remarked before may go on
+            self._remarks[uav] = note
             self.tell(EventKind.REMARK, f"{uav}: {note}", now_s, uavs=[uav])
         elif phase is StatusPhase.HOME and changed:
             self.tell(EventKind.HOME, f"{uav} is home", now_s, uavs=[uav])
@@ -309,6 +313,23 @@ class MissionNarrator:
         # With the first one mission time began.
         at_s = 0.0 if self.joining and epoch.number == 1 else None
         self.tell(EventKind.EPOCH, text, now_s, at_s=at_s)
+
+    def left_out(self, epoch: PlanEpoch, now_s: float) -> None:
+        """Tell what an epoch leaves out, as far as that is new and not over already."""
+        known, self._left_out = self._left_out, epoch.why_left_out
+        news = {
+            task: why
+            for task, why in self._left_out.items()
+            if known.get(task) != why
+            and self._board.states.get(task, TaskState.OPEN) is TaskState.OPEN
+        }
+        if not news:
+            return
+        text = f"epoch {epoch.number} leaves out {left_out_in_words(news, NAMES_TOLD)}"
+        meant = {why: why_left_out(why) for why in news.values()}
+        detail = "".join(f"; {why}: {words}" for why, words in meant.items() if words != why)
+        at_s = 0.0 if self.joining and epoch.number == 1 else None
+        self.tell(EventKind.LEFT_OUT, text, now_s, detail=detail, tasks=news, at_s=at_s)
 
     def end(self, epoch: PlanEpoch, now_s: float) -> None:
         """Tell that the mission is over."""

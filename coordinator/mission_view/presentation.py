@@ -22,6 +22,8 @@ class Signs:
     open: str
     taken: str
     """A task that a UAV is on its way to or serves."""
+    left_out: str
+    """An open task for which the plan has no place."""
     done: str
     failed: str
     uav: str
@@ -49,12 +51,14 @@ class Signs:
     def task(self, stands: str) -> str:
         """Sign of a task, by how it stands."""
         signs = {"open": self.open, "taken": self.taken, "done": self.done}
+        signs["left_out"] = self.left_out
         return signs.get(stands, self.failed)
 
 
 UNICODE = Signs(
     open="○",
     taken="◎",
+    left_out="◌",
     done="●",
     failed="×",
     uav="▲",
@@ -79,6 +83,7 @@ UNICODE = Signs(
 ASCII = Signs(
     open="o",
     taken="@",
+    left_out="%",
     done="*",
     failed="x",
     uav="^",

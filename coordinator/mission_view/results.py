@@ -6,7 +6,7 @@ With what a run's protection refused, which the report tells too.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
@@ -233,11 +233,6 @@ def _stops(
         )
         for task in tasks
     )
-
-
-def still_left_out(plan: Plan, undone: Collection[TaskId]) -> dict[TaskId, str]:
-    """Those of the tasks ``undone`` that ``plan`` leaves out, and why, in a word or two."""
-    return {task: why.value for task, why in plan.left_out.items() if task in undone}
 
 
 def compare_quantities(plan: Plan | None, result: MissionResult) -> list[QuantityComparison]:

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import deserted
-from coordinator.mission_view.results import lists_objective, still_left_out
+from coordinator.mission_view.results import lists_objective
 from coordinator.mission_view.uav_state import FleetStates, UavState, UavView
 from coordinator.mission_view.wording import short_names
 from swarm.model import Mission, TaskId, UavId
@@ -21,11 +21,15 @@ from swarm.protocol.operator_commands import in_force, zone_edits
 
 TAKEN = "taken"
 """How an open task stands that a UAV is on its way to, or serves."""
+LEFT_OUT = "left_out"
+"""How an open task stands that the plan leaves out and nobody has taken."""
 
 
-def task_stands(state: TaskState, *, taken: bool) -> str:
-    """How a task stands: its `TaskState`, or taken."""
-    return TAKEN if taken and state is TaskState.OPEN else state.value
+def task_stands(state: TaskState, *, taken: bool, left_out: bool) -> str:
+    """How a task stands: its `TaskState`, taken or left out."""
+    if state is not TaskState.OPEN:
+        return state.value
+    return TAKEN if taken else LEFT_OUT if left_out else state.value
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +45,13 @@ class TaskView:
     """Number of the UAV that has taken or done it."""
     path_enu_m: tuple[tuple[float, float, float], ...] = ()
     """Of a line, its points [m; mission origin]."""
+    left_out: str | None = None
+    """Why the plan leaves it out, if it does and nobody has taken it."""
 
     @property
     def stands(self) -> str:
-        """Its `TaskState`, or taken."""
-        return task_stands(self.state, taken=self.taken)
+        """Its `TaskState`, taken or left out."""
+        return task_stands(self.state, taken=self.taken, left_out=self.left_out is not None)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,8 +86,6 @@ class Scene:
     """Messages that all agents together have dropped."""
     zone_edits: tuple[ZoneEdit, ...] = ()
     """The operator's newest word about each zone, in this flight."""
-    left_out: Mapping[TaskId, str] = field(default_factory=dict)
-    """Open tasks that the plan leaves out, and why."""
 
     @property
     def aborted(self) -> bool:
@@ -92,6 +96,11 @@ class Scene:
     def has_sorties(self) -> bool:
         """Whether some battery ends, so that UAVs land for another."""
         return any(uav.endurance_s is not None for uav in self.mission.uavs)
+
+    @property
+    def left_out(self) -> dict[str, str]:
+        """Open tasks that the plan leaves out and nobody has taken, each with why."""
+        return {task.id: task.left_out for task in self.tasks if task.left_out is not None}
 
     @property
     def dropped_by_reason(self) -> dict[str, int]:
@@ -169,7 +178,6 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
         commands=tuple(in_force(mission_state.replica).values()),
         dropped=sum(count.total() for count in mission_state.dropped.values()),
         zone_edits=tuple(zone_edits(mission_state.replica).values()),
-        left_out={} if plan is None else still_left_out(plan, result.open),
     )
 
 
@@ -182,6 +190,7 @@ def _task_views(
 ) -> tuple[TaskView, ...]:
     """The board; before there is one, what the scenario tells at the start."""
     holders, states = mission_state.holders, mission_state.board.states
+    left_out = mission_state.left_out
     if not states:
         known = mission_state.mission.known_at_start().tasks
         return tuple(
@@ -192,6 +201,7 @@ def _task_views(
                 taken=False,
                 uav=None,
                 path_enu_m=task.path_enu_m,
+                left_out=left_out.get(task.id),
             )
             for task in known
         )
@@ -201,5 +211,6 @@ def _task_views(
         uav = by.get(task_id) if holder is None else numbers.get(UavId(holder))
         entry = mission_state.replica.board[task_id]
         place, path = entry.position_enu_m, entry.path_enu_m
-        views.append(TaskView(TaskId(task_id), place, state, holder is not None, uav, path))
+        why, taken = left_out.get(task_id), holder is not None
+        views.append(TaskView(TaskId(task_id), place, state, taken, uav, path, why))
     return tuple(views)

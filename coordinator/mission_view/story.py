@@ -21,6 +21,8 @@ class EventKind(StrEnum):
     NOTE = "note"
     """Nothing of the others: about processes, keys, the story itself."""
     EPOCH = "epoch"
+    LEFT_OUT = "left out"
+    """A plan has no place for tasks."""
     END = "end"
     COORDINATOR = "coordinator"
     """It is back, or another one has taken charge."""
@@ -60,7 +62,7 @@ _OPENERS = frozenset(
 )
 """Words that begin a sentence with a capital; whatever else begins one is an id."""
 _TROUBLE = frozenset({EventKind.LOST, EventKind.FAILED})
-_UNUSUAL = frozenset({EventKind.CLAIMED, EventKind.POSTED, EventKind.OUT})
+_UNUSUAL = frozenset({EventKind.CLAIMED, EventKind.LEFT_OUT, EventKind.POSTED, EventKind.OUT})
 
 
 @dataclass(frozen=True, slots=True)

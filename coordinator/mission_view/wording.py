@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
-from swarm.model import TaskId
 from swarm.model.ids import FLEET
 from swarm.model.plan import LeftOut
 from swarm.protocol.board import claim_strength
@@ -120,7 +119,12 @@ LEFT_OUT_WORDS: Final = {
 """Why a plan leaves a task out."""
 
 
-def left_out_in_words(left_out: Mapping[TaskId, str], at_most: int | None = None) -> str:
+def why_left_out(reason: str) -> str:
+    """What a reason for which a task is left out means; of a later release it says itself."""
+    return {known.value: words for known, words in LEFT_OUT_WORDS.items()}.get(reason, reason)
+
+
+def left_out_in_words(left_out: Mapping[str, str], at_most: int | None = None) -> str:
     """Tasks that are left out, each with its reason; of more than ``at_most`` the first ones."""
     return listed([f"{task} ({why})" for task, why in left_out.items()], at_most)
 

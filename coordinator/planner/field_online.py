@@ -13,11 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from coordinator.planner.field_guided import field_guided_plan
+from coordinator.planner.field_schedule import left_out
 from coordinator.planner.options import ShouldStop, after_evaluations, first_of, never
 from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.rules import FIELD_RULES, GUIDED, item_lists
 from swarm.kernels.field import fly_lists, run_rule
 from swarm.kernels.field_alone import earliest_alone
+from swarm.model.plan import by_reason
 from swarm.protocol.bases import blocking
 from swarm.protocol.board import TaskBoard
 from swarm.protocol.field_board import field_state
@@ -148,6 +150,15 @@ def worth_to_go(standing: FieldStanding, routes: Mapping[str, Sequence[str]]) ->
     """Required tasks left out, and J, if the fleet goes on by such lists from here [value·s]."""
     course = _searched(standing, item_lists(standing.problem, routes))
     return course.n_left_out, course.objective
+
+
+def left_out_by(
+    standing: FieldStanding, routes: Mapping[str, Sequence[str]]
+) -> dict[str, tuple[str, ...]]:
+    """Open tasks that are on no list, by why."""
+    columns = {str(task): column for column, task in enumerate(standing.problem.task_ids)}
+    listed = [columns[task] for tasks in routes.values() for task in tasks if task in columns]
+    return by_reason(left_out(standing.problem, standing.state, listed))
 
 
 def _searched(standing: FieldStanding, begin: Items, stop: ShouldStop = never) -> FieldCourse:

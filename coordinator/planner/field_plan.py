@@ -233,7 +233,7 @@ def _described(
         elapsed_s=0.0,
         seed=0,
         schedule=schedule,
-        left_out=left_out(problem, done),
+        left_out=left_out(problem, FieldState.at_start(problem), done),
         required_left_out=int(problem.required.sum() - problem.required[done].sum()),
     )
 

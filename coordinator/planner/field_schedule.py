@@ -5,7 +5,7 @@ Leaves out: which lists (coordinator.planner.plan, coordinator.planner.field_pla
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -120,12 +120,14 @@ def _on_map(place_enu_m: FloatArray) -> tuple[float, float]:
     return east_m, north_m
 
 
-def left_out(problem: FieldProblem, done: Sequence[int]) -> Mapping[TaskId, LeftOut]:
-    """Why each task that is not among those ``done`` is on no list."""
-    missing = np.setdiff1d(np.arange(problem.n_task), np.asarray(done, dtype=np.int64))
+def left_out(
+    problem: FieldProblem, state: FieldState, listed: Sequence[int]
+) -> dict[TaskId, LeftOut]:
+    """Why each task that is open in ``state`` and not ``listed`` is on no list."""
+    missing = np.setdiff1d(np.flatnonzero(state.open), np.asarray(listed, dtype=np.int64))
     if not len(missing):
         return {}
-    alone_s = earliest_alone(problem.kernel, FieldState.at_start(problem))
+    alone_s = earliest_alone(problem.kernel, state)
     somebody_can = np.any(np.isfinite(alone_s), axis=0)
     reasons = {}
     for task in missing.tolist():

@@ -26,6 +26,7 @@ from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule, rule_by_name, team_arrays
 from swarm.kernels.rollout import guided_choice
+from swarm.model.plan import LeftOut
 from swarm.protocol.board import (
     TaskBoard,
     TaskState,
@@ -137,6 +138,12 @@ class Situation:
         """UAVs that can be given tasks."""
         ids, active = self.problem.uav_ids, self.state.active
         return frozenset(uav for uav, is_active in zip(ids, active, strict=True) if is_active)
+
+    @property
+    def open_tasks(self) -> tuple[str, ...]:
+        """What nobody has ended or claims."""
+        ids = self.problem.task_ids
+        return tuple(str(ids[task]) for task in np.flatnonzero(self.state.open).tolist())
 
     @property
     def is_settled(self) -> bool:
@@ -414,6 +421,21 @@ def complete_lists(situation: Situation, new: Lists) -> Lists:
         able = int(problem.capable[:, column].argmax())
         add(problem.uav_ids[able], problem.task_ids[column])
     return {uav: tuple(tasks) for uav, tasks in lists.items()}
+
+
+def left_out_by(situation: Situation, lists: Lists) -> dict[str, tuple[str, ...]]:
+    """Open tasks that are on none of ``lists``, by why; see `swarm.model.plan.LeftOut`.
+
+    Without the field's constraints those that nobody who takes part can do.
+    """
+    if situation.field is not None:
+        from coordinator.planner.field_online import left_out_by as left_out_in_field
+
+        return left_out_in_field(situation.field, lists)
+    problem, state = situation.problem, situation.state
+    beyond = state.open & ~problem.capable[state.active].any(axis=0)
+    tasks = tuple(str(problem.task_ids[task]) for task in np.flatnonzero(beyond).tolist())
+    return {LeftOut.NOBODY_CAN.value: tasks} if tasks else {}
 
 
 def worth_to_go(situation: Situation, lists: Lists) -> tuple[int, float]:

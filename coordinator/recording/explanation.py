@@ -17,14 +17,13 @@ from coordinator.mission_view.presentation import BAD
 from coordinator.mission_view.results import dues_of, progress_of
 from coordinator.mission_view.story import EventKind, MissionEvent
 from coordinator.mission_view.wording import (
-    LEFT_OUT_WORDS,
     clean,
     listed,
     seconds_in_words,
     shown_value,
+    why_left_out,
 )
 from coordinator.recording.reader import Recording
-from swarm.model import TaskId
 from swarm.protocol.board import TaskState
 from swarm.protocol.uav_messages import AttemptResult, StatusPhase
 from swarm.runtime.errors import Fault, InputError
@@ -114,8 +113,8 @@ def explain_task(recording: Recording, task: str) -> Explanation:
             holder = mission_state.holders.get(task)
             who = f"with {holder} on its way to it" if holder else "with nobody on the way to it"
             ending = f"So {task} is still open as the recording ends, {who}."
-            if (why := _left_out(recording, task)) is not None:
-                ending = f"The plan leaves {task} out: {why}. {ending}"
+            if (why := mission_state.left_out.get(task)) is not None:
+                ending = f"The plan leaves {task} out: {why_left_out(why)}. {ending}"
     return Explanation(
         mission=recording.mission,
         subject="task",
@@ -170,13 +169,6 @@ def explain_uav(recording: Recording, uav: str) -> Explanation:
         objective=objective,
         ending=f"So {uav} {did}{but}, and {how}.",
     )
-
-
-def _left_out(recording: Recording, task: str) -> str | None:
-    """Why the last plan leaves that task out, in words; None if it does not, or is not known."""
-    plans = recording.plans
-    reason = plans[-1].plan.left_out.get(TaskId(task)) if plans else None
-    return None if reason is None else LEFT_OUT_WORDS[reason]
 
 
 def _explained(recording: Recording) -> MissionState:

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.presentation import uav_colour
-from coordinator.mission_view.scene import TAKEN, Scene, scene_of
+from coordinator.mission_view.scene import LEFT_OUT, TAKEN, Scene, scene_of
 from coordinator.mission_view.uav_state import LOST, UavView
 from coordinator.recording.foxglove_schemas import (
     LOCATION_FIX,
@@ -61,6 +61,7 @@ _WHITE: Final = (1.0, 1.0, 1.0, 1.0)
 _STATE_COLOURS: Final = {
     "open": (0.9, 0.62, 0.0, 1.0),
     "taken": (0.34, 0.71, 0.91, 1.0),
+    "left_out": (0.9, 0.62, 0.0, 0.4),
     "done": (0.0, 0.62, 0.45, 0.6),
     "failed": (0.84, 0.37, 0.0, 1.0),
     "withdrawn": _GREY,
@@ -208,7 +209,7 @@ def _progress(mission_state: MissionState, scene: Scene, now_s: float) -> FileMe
         objective=scene.objective,
         plan_objective=scene.planned_objective,
         bound=plan.bound if scene.optimum is None and plan is not None else scene.optimum,
-        open=counts[TaskState.OPEN],
+        open=counts[TaskState.OPEN] + counts[LEFT_OUT],
         taken=counts[TAKEN],
         done=counts[TaskState.DONE],
         failed=counts[TaskState.FAILED],
@@ -284,21 +285,22 @@ def _base(base: Base, who: str, size_m: float, time_ns: int) -> Json:
 
 
 def _task_entities(scene: Scene, size_m: float, time_ns: int) -> list[Json]:
-    """One entity for each state: what nobody has touched is a ball, what is over a box.
+    """One entity for each state: what nobody has ended is a ball, what is over a box.
 
-    Another tells which open ones the plan leaves out, and why.
+    That of the tasks that the plan leaves out tells why.
     """
     tasks, entities = scene.tasks, []
-    why = {str(task): reason for task, reason in scene.left_out.items()}
-    if scene.mission.zones or scene.mission.bases or why:
-        entities.append(entity("left out", FRAME, time_ns, why))
     for state, colour in _STATE_COLOURS.items():
         mine = [task.position_enu_m for task in tasks if task.stands == state]
         shape, kind = (
-            (sphere, "spheres") if state in (TaskState.OPEN.value, TAKEN) else (cube, "cubes")
+            (sphere, "spheres")
+            if state in (TaskState.OPEN.value, TAKEN, LEFT_OUT)
+            else (cube, "cubes")
         )
         solids = [shape(at, size_m, colour) for at in mine]
-        entities.append(entity(state, FRAME, time_ns, {"tasks": str(len(mine))}, **{kind: solids}))
+        facts = scene.left_out if state == LEFT_OUT else {"tasks": str(len(mine))}
+        name = state.replace("_", " ")
+        entities.append(entity(name, FRAME, time_ns, facts, **{kind: solids}))
     if len(tasks) <= MOST_LABELS:
         labels = [text(_raised(t.position_enu_m, -size_m), t.id, _WHITE) for t in tasks]
         entities.append(entity("names", FRAME, time_ns, {}, texts=labels))

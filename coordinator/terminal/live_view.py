@@ -24,7 +24,7 @@ from coordinator.mission_view.presentation import (
     story_style,
 )
 from coordinator.mission_view.results import refusals
-from coordinator.mission_view.scene import TAKEN, Scene, scene_of
+from coordinator.mission_view.scene import LEFT_OUT, TAKEN, Scene, scene_of
 from coordinator.mission_view.story import MissionEvent
 from coordinator.mission_view.wording import clean, shown_value
 from coordinator.terminal.fleet_table import alerts, fit_cells, fleet_table, table_width, task_lists
@@ -263,6 +263,8 @@ def task_counts(scene: Scene, signs: Signs) -> Text:
         (signs.taken, f"{count[TAKEN]} taken", ""),
         (signs.open, f"{count[TaskState.OPEN]} open", ""),
     ]
+    if left_out := count[LEFT_OUT]:
+        parts.append((signs.left_out, f"{left_out} left out", "yellow"))
     if failed := count[TaskState.FAILED]:
         parts.append((signs.failed, f"{failed} failed", BAD))
     if withdrawn:

@@ -25,7 +25,6 @@ from coordinator.mission_view.results import (
     compare_quantities,
     compare_routes,
     deviations,
-    still_left_out,
     summary_line,
 )
 from coordinator.mission_view.story import MissionEvent, notable
@@ -79,6 +78,8 @@ class MissionReport:
     """Least distance of a UAV in flight from a zone [m]; None without zones, or if not known."""
     lowest_charge_frac: Mapping[str, float] = field(default_factory=dict)
     """By UAV, the least charge of its battery that was told while it took part."""
+    left_out: Mapping[str, str] = field(default_factory=dict)
+    """Tasks that the last plan left out and that were not done after all, each with why."""
     hint: str = _HINT
     """How to get more; the last line of `render`."""
 
@@ -198,8 +199,8 @@ class MissionReport:
     def _of_field(self) -> list[ReportFact]:
         """What the plan left out and was not done after all; batteries that were changed."""
         found = []
-        if self.plan is not None and (left := still_left_out(self.plan, self.result.open)):
-            ids = tuple(f"{task} ({why})" for task, why in left.items())
+        if self.left_out:
+            ids = tuple(f"{task} ({why})" for task, why in self.left_out.items())
             found.append(ReportFact("left out", "by the plan", ids))
         swaps = {
             # The last entry may be a way home, where nothing is changed.

@@ -9,7 +9,7 @@ from rich.table import Table
 from rich.text import Text
 
 from coordinator.mission_view.presentation import BAD, Signs, uav_colour
-from coordinator.mission_view.scene import TAKEN, Scene
+from coordinator.mission_view.scene import LEFT_OUT, TAKEN, Scene
 from coordinator.mission_view.uav_state import ABSENT, LOST, UavView
 from coordinator.mission_view.wording import (
     because,
@@ -31,7 +31,9 @@ _MOST_LEFT_OUT = 8
 
 def status_as_json(scene: Scene) -> dict[str, Any]:
     """``scene`` as `swarm status --json` prints it, ready for `json.dumps`."""
-    tasks = {state: scene.counts[state] for state in TaskState}
+    count = scene.counts
+    tasks = {state: count[state] for state in TaskState}
+    tasks[TaskState.OPEN] += count[TAKEN] + count[LEFT_OUT]
     return {
         "mission": scene.mission.name,
         "phase": scene.phase,
@@ -43,15 +45,14 @@ def status_as_json(scene: Scene) -> dict[str, Any]:
         "horizon_s": scene.mission.horizon_s,
         "objective": scene.objective,
         "planned_objective": scene.planned_objective,
-        "left_out": dict(scene.left_out),
+        "left_out": scene.left_out,
         "zones": [zone.id for zone in scene.mission.zones],
         "bases": [base.id for base in scene.mission.bases],
         "zone_edits": {
             edit.zone.id: {"withdrawn": edit.withdrawn, "reason": edit.reason}
             for edit in scene.zone_edits
         },
-        "tasks": tasks
-        | {TaskState.OPEN: tasks[TaskState.OPEN] + scene.counts[TAKEN], TAKEN: scene.counts[TAKEN]},
+        "tasks": tasks | {TAKEN: count[TAKEN]},
         "link": scene.cut_s is None,
         "coordinator": scene.coordinator,
         "others": list(scene.others),

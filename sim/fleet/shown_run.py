@@ -104,6 +104,7 @@ class ShownRun:
             closest_approach_m=flight.mission_state.flights.closest_approach_m,
             nearest_zone_m=flight.mission_state.limits.nearest_zone_m,
             lowest_charge_frac=flight.mission_state.limits.lowest_charge_frac,
+            left_out=flight.mission_state.left_out,
             security=security_of(options, self._mission, flight.dropped),
         )
         status = print_report(told, json=outputs.json, report=outputs.report)

@@ -135,6 +135,7 @@ def simulate(
             value=flown.value,
             executed_schedule=flown.world.executed_schedule(),
             closest_approach_m=flown.world.closest_approach_m(),
+            left_out=flown.world.mission_state.left_out,
         )
         return print_report(told, json=json, report=report)
 
@@ -169,6 +170,7 @@ def _fly_with_faults(
         story=tuple(state.story),
         executed_schedule=verdict.world.executed_schedule(),
         closest_approach_m=verdict.world.closest_approach_m(),
+        left_out=state.left_out,
     )
     return told, verdict.broken is not None
 

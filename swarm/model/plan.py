@@ -70,6 +70,14 @@ class LeftOut(Enum):
     ENERGY = "energy"
 
 
+def by_reason(left_out: Mapping[TaskId, LeftOut]) -> dict[str, tuple[str, ...]]:
+    """The tasks that are left out for each reason."""
+    reasons: dict[str, list[str]] = {}
+    for task, why in left_out.items():
+        reasons.setdefault(why.value, []).append(task)
+    return {why: tuple(tasks) for why, tasks in reasons.items()}
+
+
 Schedule = Mapping[UavId, tuple[ScheduleEntry, ...]]
 """Per UAV in the order of flight."""
 

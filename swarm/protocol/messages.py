@@ -34,6 +34,7 @@ from swarm.protocol.fields import (
     Metres,
     Point,
     Probability,
+    Reason,
     Speed,
     Value,
     WindSpeed,
@@ -152,6 +153,16 @@ class PlanEpoch(Checked):
     """Why this epoch, in words."""
     routes: Mapping[Id, tuple[Id, ...]]
     """Planned task lists by UAV; what rules make of them is theirs."""
+    left_out: Mapping[Reason, tuple[Id, ...]] = field(default_factory=dict)
+    """Open tasks that are on none of them, by why, in words of `swarm.model.plan.LeftOut`.
+
+    For who looks on; no decision reads it. So it may be told anew under the same number.
+    """
+
+    @property
+    def why_left_out(self) -> dict[str, str]:
+        """By task that it leaves out, why."""
+        return {task: why for why, tasks in self.left_out.items() for task in tasks}
 
 
 @dataclass(frozen=True, slots=True)

@@ -122,8 +122,9 @@ def epoch(
     mission_s: float = 0.0,
     rule: str = "greedy",
     reason: str = "",
+    left_out: Mapping[str, tuple[str, ...]] | None = None,
 ) -> PlanEpoch:
-    return PlanEpoch(number, phase, rule, sequence, mission_s, reason, {})
+    return PlanEpoch(number, phase, rule, sequence, mission_s, reason, {}, left_out or {})
 
 
 def proposed(name: str, decided_s: float, rank: int = 0, completion_s: float = 1000.0) -> Claim:

@@ -111,6 +111,11 @@ epochs = st.builds(
     numbers,
     notes,
     st.dictionaries(uav_ids, st.lists(task_ids, unique=True, max_size=3).map(tuple), max_size=3),
+    st.dictionaries(
+        st.sampled_from(["due", "nobody can", "energy"]),
+        st.lists(task_ids, unique=True, max_size=3).map(tuple),
+        max_size=2,
+    ),
 )
 
 

@@ -7,7 +7,7 @@ import { drawDoing, sortieLeft } from "./fleet.js";
 import { degreesOf } from "./frames.js";
 import { reasons } from "./links.js";
 import { drawTaskState } from "./tasks.js";
-import { NOTHING, TASK_SIGNS, degrees, number, percent, place, seconds, taskState } from "./words.js";
+import { NOTHING, TASK_SIGNS, degrees, number, percent, place, seconds, stateWord, taskState } from "./words.js";
 
 const LAST_CHOICES = 3;
 
@@ -158,6 +158,7 @@ export class Card {
     const facts = [
       [who, row.uav ? this.#go("uav", row.uav) : NOTHING, row.uav],
       ["Planned for", planners.length ? this.#go("uav", planners[0]) : NOTHING, planners[0]],
+      row.left_out ? ["Left out", row.why] : null,
       ["Value", number(row.value)],
       ["Service", seconds(row.service_s)],
       ["Kind", row.kind ?? NOTHING],
@@ -172,7 +173,7 @@ export class Card {
       ["Added by", row.by],
     ].filter(Boolean);
     return [
-      ["state", state, () => this.#drawn(drawTaskState, row)],
+      ["state", [state, row.left_out], () => this.#drawn(drawTaskState, row)],
       ["actions", [row.state, this.operator.able], () => this.#taskActions(row)],
       ["facts", facts.map(([title, value, key]) => [title, key ?? String(value)]), () => definition(facts)],
       ["choices", this.#choicesKey(), () => this.#choices()],
@@ -226,7 +227,7 @@ export class Card {
       const button = this.#go("task", id);
       button.className = `chip-task task-${state}`;
       button.prepend(make("i", { "aria-hidden": "true" }, TASK_SIGNS[state]));
-      button.setAttribute("aria-label", `${id}, ${state}`);
+      button.setAttribute("aria-label", `${id}, ${stateWord(state, task)}`);
       return make("li", {}, button);
     });
     return make(

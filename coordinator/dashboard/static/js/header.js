@@ -2,7 +2,7 @@
 
 import { byId, make, setAttribute, setText } from "./dom.js";
 import { isTroubled } from "./fleet.js";
-import { NOTHING, TASK_STATES, count, number, percent, seconds } from "./words.js";
+import { NOTHING, TASK_STATES, count, number, percent, seconds, stateWord } from "./words.js";
 
 const PHASES = { preparing: "preparing", running: "running", ended: "ended" };
 const RESTING = ["home", "out", "lost", "absent"];
@@ -91,7 +91,7 @@ export class Header {
       byId("progress"),
       "aria-label",
       counts
-        ? `Tasks: ${TASK_STATES.map((state) => `${counts[state] ?? 0} ${state}`).join(", ")}`
+        ? `Tasks: ${TASK_STATES.map((state) => `${counts[state] ?? 0} ${stateWord(state)}`).join(", ")}`
         : "No tasks yet",
     );
   }

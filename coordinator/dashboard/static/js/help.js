@@ -1,7 +1,7 @@
 // Keys and signs, explained in a dialog.
 
 import { make } from "./dom.js";
-import { DOES, TASK_SIGNS } from "./words.js";
+import { DOES, TASK_SIGNS, stateWord } from "./words.js";
 
 export const KEYS = [
   ["?", "this page"],
@@ -21,6 +21,7 @@ export const KEYS = [
 
 const WORDS = {
   open: "waiting",
+  left_out: "waiting, and the plan leaves it out",
   taken: "a UAV is on its way or at it",
   done: "done",
   failed: "failed",
@@ -40,7 +41,7 @@ export function showHelp() {
       make(
         "li",
         {},
-        make("span", { class: `state task-${state}` }, make("i", {}, sign), state),
+        make("span", { class: `state task-${state}` }, make("i", {}, sign), stateWord(state)),
         WORDS[state],
       ),
     ),

@@ -5,7 +5,7 @@ import { make, setText } from "./dom.js";
 import { PLANE, earth } from "./frames.js";
 import { View, paintGround, paintUavs, taskRadius } from "./paint.js";
 import { timed } from "./timing.js";
-import { number, place, taskState } from "./words.js";
+import { number, place, stateWord, taskState } from "./words.js";
 
 /** Least time between two pictures of what moves [ms]: 30 a second are smooth enough. */
 const BETWEEN_MS = 30;
@@ -268,7 +268,7 @@ export class MissionMap {
       return `${id} · ${uav.visit ?? uav.does}${goal ? ` → ${goal}` : ""}`;
     }
     const task = this.picture.tasks.get(id);
-    return `${id} · ${taskState(task)}${task.uav ? ` · ${task.uav}` : ""} · value ${number(task.value)}`;
+    return `${id} · ${stateWord(taskState(task), task)}${task.uav ? ` · ${task.uav}` : ""} · value ${number(task.value)}`;
   }
 
   /** What lies under a point: `[kind, id]` or null; UAVs go first. */

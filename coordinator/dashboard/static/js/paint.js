@@ -254,7 +254,7 @@ function paintTasks(canvas, view, picture, look, spots) {
   paintLabels(canvas, labels, look, 10);
 }
 
-/** One task: hollow when open, with a core when taken, full when done, crossed when failed. */
+/** One task: hollow when open, dashed when left out, with a core when taken, full when done, crossed when failed. */
 function paintTask(canvas, task, [x, y], picture, look) {
   const { ink } = look;
   const state = taskState(task);
@@ -266,6 +266,11 @@ function paintTask(canvas, task, [x, y], picture, look) {
   if (state === "open") {
     canvas.strokeStyle = ink.text;
     disc(canvas, x, y, radius);
+  } else if (state === "left_out") {
+    canvas.strokeStyle = ink.text;
+    canvas.setLineDash([2, 3]);
+    disc(canvas, x, y, radius);
+    canvas.setLineDash([]);
   } else if (state === "taken") {
     canvas.lineWidth += 0.5;
     disc(canvas, x, y, radius + 1);

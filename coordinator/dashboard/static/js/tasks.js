@@ -2,7 +2,7 @@
 
 import { make, setAttribute } from "./dom.js";
 import { Grid } from "./grid.js";
-import { NOTHING, TASK_SIGNS, TASK_STATES, number, seconds, taskState } from "./words.js";
+import { NOTHING, TASK_SIGNS, TASK_STATES, number, seconds, stateWord, taskState } from "./words.js";
 
 export class TaskTable {
   constructor(panel, picture, onSelect) {
@@ -32,7 +32,7 @@ export class TaskTable {
         {
           id: "state",
           title: "State",
-          value: taskState,
+          value: (row) => stateWord(taskState(row), row),
           rank: (row) => TASK_STATES.indexOf(taskState(row)),
           draw: drawTaskState,
         },
@@ -71,7 +71,7 @@ export class TaskTable {
     for (const row of rows) counts.set(taskState(row), (counts.get(taskState(row)) ?? 0) + 1);
     for (const [state, button] of this.filters) {
       const many = state === null ? rows.length : (counts.get(state) ?? 0);
-      const text = state === null ? `All ${many}` : `${TASK_SIGNS[state]} ${state} ${many}`;
+      const text = state === null ? `All ${many}` : `${TASK_SIGNS[state]} ${stateWord(state)} ${many}`;
       if (button.textContent !== text) button.textContent = text;
       button.hidden = state !== null && many === 0 && this.only !== state;
     }
@@ -92,9 +92,9 @@ export function drawTaskState(cell, row) {
   cell.replaceChildren(
     make(
       "span",
-      { class: `state task-${state}` },
+      { class: `state task-${state}`, title: row.why },
       make("i", { "aria-hidden": "true" }, TASK_SIGNS[state]),
-      state,
+      stateWord(state, row),
     ),
   );
 }

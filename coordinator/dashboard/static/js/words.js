@@ -23,14 +23,28 @@ export const DOES = {
   absent: ["▽", "trouble"],
 };
 
-/** Task states in the order of a mission; "taken" is open with a UAV on its way. */
-export const TASK_STATES = ["open", "taken", "done", "failed", "withdrawn"];
-export const TASK_SIGNS = { open: "○", taken: "◎", done: "●", failed: "×", withdrawn: "⊘" };
+/** Task states in the order of a mission; "taken" is open with a UAV on its way, "left_out" by the plan. */
+export const TASK_STATES = ["open", "left_out", "taken", "done", "failed", "withdrawn"];
+export const TASK_SIGNS = {
+  open: "○",
+  left_out: "◌",
+  taken: "◎",
+  done: "●",
+  failed: "×",
+  withdrawn: "⊘",
+};
 export const COMMAND_SIGNS = { pending: "◌", obeyed: "✓", "not obeyed": "×" };
 
 /** State of a task as the page shows it. */
 export function taskState(task) {
-  return task.state === "open" && task.taken ? "taken" : task.state;
+  if (task.state !== "open") return task.state;
+  if (task.taken) return "taken";
+  return task.left_out ? "left_out" : "open";
+}
+
+/** A state as people read it, of a task with the reason why it is left out. */
+export function stateWord(state, task = null) {
+  return state.replace("_", " ") + (task?.left_out ? ` (${task.left_out})` : "");
 }
 
 /** A number with at most that many digits behind the point, thousands apart. */

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from coordinator.core.lifecycle import Replan, Replanned
+from coordinator.core.lifecycle import PlanMade, Replan, Replanned
 from coordinator.core.publication import (
     exit_status,
     mission_config_of,
@@ -16,8 +16,9 @@ from coordinator.core.publication import (
 )
 from sim.world.settings import planned_anew
 from swarm.allocation.field import FieldProblem
-from swarm.model import Base, BaseId, Mission, Zone, ZoneId
+from swarm.model import Base, BaseId, Mission, TaskId, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.model.plan import LeftOut
 from swarm.protocol.board import TaskBoard, is_of_field, mission_of
 from swarm.protocol.calibration import FlightRates
 from swarm.protocol.codec import Codec
@@ -48,6 +49,7 @@ from tests.support.lone_coordinator import (
     LoneCoordinator,
     finishes,
     notes,
+    plan_of,
     plans_wanted,
     said,
 )
@@ -256,6 +258,33 @@ def test_a_plan_without_constraints_is_of_the_schema_of_the_file() -> None:
         assert wanted.mission.schema == 2
     (wanted,) = plans_wanted(LoneCoordinator(mission([U0], [task("t0", 5.0)])).log)
     assert wanted.mission.schema == 1
+
+
+def test_an_epoch_tells_what_its_plan_leaves_out_and_then_what_nobody_can_do_any_more() -> None:
+    flown = mission([U0], [WINDOWED, replace(task("t1", 900.0), due_s=50.0)])
+    timing = replace(TIMING, replan_interval_s=5.0)
+    coordinator = LoneCoordinator(flown, timing=timing)
+    plan = replace(plan_of(flown, "u0"), left_out={TaskId("t1"): LeftOut.DUE})
+    (wanted,) = plans_wanted(coordinator.log)
+    coordinator.happen(PlanMade(wanted.request, plan))
+    coordinator.ready("u0")
+    assert coordinator.epoch is not None
+    assert coordinator.epoch.left_out == {"due": ("t1",)}
+
+    coordinator.hear("u0", held("t0", 0.0), 101.0)
+    coordinator.run_until(120.0)
+
+    epoch = coordinator.epoch
+    assert (epoch.number, epoch.phase) == (1, MissionPhase.RUNNING)
+    assert epoch.left_out == {"nobody can": ("t1",)}
+    (line,) = (line for line in notes(coordinator.log) if line.text == "leaves out other tasks")
+    assert line.fields == {"tasks": "t1 (nobody can)"}
+
+    coordinator.hear("u0", done("t0", 25.0), 125.0)
+    coordinator.hear("u0", IDLE, 125.0)
+    coordinator.run_until(300.0)
+    assert coordinator.phase is MissionPhase.ENDED
+    assert coordinator.epoch.left_out == {"nobody can": ("t1",)}
 
 
 def test_that_a_uav_may_start_again_is_logged_and_kept() -> None:

@@ -16,8 +16,10 @@ from starlette.websockets import WebSocketDisconnect
 from coordinator.dashboard.access import AccessRules
 from coordinator.dashboard.app import Dashboard
 from coordinator.dashboard.feed import PageSettings
+from swarm.model.ids import COORDINATOR
 from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEdit
 from swarm.protocol.uav_messages import StatusPhase
+from tests.support.builders import epoch
 from tests.support.desk_play import DeskPlay, FakePlayer
 
 TOKEN = "0123456789abcdef"
@@ -384,6 +386,7 @@ def test_the_metrics_are_what_prometheus_reads(page: TestClient, play: DeskPlay)
     play.dropped = {"malformed": 3}
     play.claim("u1", "t1")
     play.end("u2", "t2")
+    play.say(COORDINATOR, epoch("u1", "u2", number=2, left_out={"due": ("t3", "t2")}))
     page.post("/api/command", json=HOLD)
     play.lose("u1")
     with page.websocket_connect("/feed") as socket:
@@ -410,6 +413,7 @@ def test_the_metrics_are_what_prometheus_reads(page: TestClient, play: DeskPlay)
     assert value("peckorder_plan_objective_value_seconds") == pytest.approx(2970.0)
     assert value("peckorder_tasks", state="open") == 2.0
     assert value("peckorder_tasks", state="done") == 1.0
+    assert value("peckorder_tasks_left_out", reason="due") == 1.0
     assert value("peckorder_uav_present", uav="u1") == 0.0
     assert value("peckorder_uav_lost", uav="u1") == 1.0
     assert value("peckorder_uav_phase", uav="u1", phase="lost") == 1.0

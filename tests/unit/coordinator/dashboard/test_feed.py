@@ -13,7 +13,7 @@ from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import MessageReceived
 from swarm.protocol.messages import Message, MissionPhase, Stamp
 from swarm.protocol.uav_messages import AttemptResult, Candidate, Choice, ChoiceBasis, StatusPhase
-from tests.support.builders import MISSION, OUT
+from tests.support.builders import MISSION, OUT, epoch
 from tests.support.desk_play import DeskPlay, FakePlayer
 
 KEYS = {"uavs": "id", "tasks": "id", "lists": "uav", "zones": "id", "commands": "n"}
@@ -79,7 +79,14 @@ def test_a_whole_frame_tells_everything() -> None:
     assert picture["whole"]
     assert (picture["phase"], picture["epoch"], picture["rule"]) == ("running", 1, "greedy")
     assert (picture["coordinator"], picture["aborted"], picture["mission_s"]) == (True, False, 4.0)
-    assert picture["counts"] == {"open": 1, "taken": 1, "done": 1, "failed": 0, "withdrawn": 0}
+    assert picture["counts"] == {
+        "open": 1,
+        "taken": 1,
+        "left_out": 0,
+        "done": 1,
+        "failed": 0,
+        "withdrawn": 0,
+    }
     u1 = picture["uavs"]["u1"]
     assert (u1["does"], u1["task"], u1["claim"], u1["eta_s"]) == ("flying", "t1", "held", 6.0)
     assert (u1["position"], u1["battery"], u1["present"]) == ([3.0, 0.0, 0.0], 0.5, True)
@@ -95,6 +102,28 @@ def test_a_whole_frame_tells_everything() -> None:
     assert picture["story"][-1]["text"] == "u2 ended t2: done"
     mission = json.loads(feed.mission or "")
     assert [uav["id"] for uav in mission["uavs"]] == ["u1", "u2"]
+
+
+def test_a_task_that_the_plan_leaves_out_is_told_with_the_reason_until_somebody_takes_it() -> None:
+    play = DeskPlay()
+    play.begin()
+    feed = feed_of(play)
+    play.say(COORDINATOR, epoch("u1", "u2", number=2, left_out={"energy": ("t3",)}))
+    feed.look()
+
+    page = Page(feed)
+    picture = page.read()
+    row = picture["tasks"]["t3"]
+    assert (row["state"], row["taken"], row["left_out"]) == ("open", False, "energy")
+    assert row["why"] == "nobody has the energy for it beside the rest"
+    assert (picture["counts"]["open"], picture["counts"]["left_out"]) == (2, 1)
+
+    play.claim("u1", "t3")
+    feed.look()
+    picture = page.read()
+    row = picture["tasks"]["t3"]
+    assert (row["taken"], row["left_out"], row["why"]) == (True, None, None)
+    assert (picture["counts"]["taken"], picture["counts"]["left_out"]) == (1, 0)
 
 
 def test_what_has_not_changed_is_not_told_again() -> None:

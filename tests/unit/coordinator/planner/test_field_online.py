@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import random
 
+import numpy as np
 import pytest
 
 from coordinator.planner.online import (
     EpochPolicy,
     Situation,
     complete_lists,
+    left_out_by,
     predicted,
     replan,
     worth_to_go,
 )
 from swarm.allocation.field import FieldProblem
 from swarm.kernels.field import FIELD_GREEDY
+from swarm.kernels.field_alone import earliest_alone
 from tests.support.field_dilemmas import dilemma
 from tests.support.field_missions import mission_of
 from tests.support.field_registers import Moment, PlannedRun
@@ -103,3 +106,34 @@ def test_what_a_uav_can_reach_no_more_settles_the_mission() -> None:
             nothing: dict[str, tuple[str, ...]] = dict.fromkeys(situation.problem.uav_ids, ())
             assert predicted(situation, COURSE).lists == nothing
     assert any(situation.is_settled for situation in ends)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_what_is_open_is_on_a_list_or_left_out_for_a_reason(seed: int) -> None:
+    for moment in moments(seed):
+        situation = situation_of(moment)
+        standing = situation.field
+        assert standing is not None
+        found = replan(situation, COURSE, "guided", seed=seed, threads=1)
+
+        left_out = left_out_by(situation, found.prediction.lists)
+
+        listed = [task for tasks in found.prediction.lists.values() for task in tasks]
+        left = {task: why for why, tasks in left_out.items() for task in tasks}
+        assert sorted([*listed, *left]) == sorted(situation.open_tasks)
+        column_of: dict[str, int] = {t: n for n, t in enumerate(standing.problem.task_ids)}
+        alone_s = earliest_alone(standing.problem.kernel, standing.state)
+        for task, why in left.items():
+            column = column_of[task]
+            assert (why == "nobody can") == (not np.isfinite(alone_s[:, column]).any())
+            if why != "nobody can":
+                windowed = np.isfinite(standing.problem.closes_s[column])
+                required = "window" if windowed else "energy"
+                assert why == (required if standing.problem.required[column] else "due")
+
+
+def test_moments_leave_something_out_for_more_than_one_reason() -> None:
+    situations = [situation_of(moment) for seed in range(6) for moment in moments(seed)]
+    nothing: dict[str, tuple[str, ...]] = {}
+
+    assert len({why for each in situations for why in left_out_by(each, nothing)}) > 1

@@ -13,9 +13,8 @@ from coordinator.recording.growing_mcap import Patch
 from coordinator.recording.reader import Recording, read_recording
 from coordinator.recording.recorder import Recorder, RecordingInfo
 from coordinator.recording.records import RecordingStarted
-from swarm.model import Plan, TaskId
+from swarm.model import Plan
 from swarm.model.ids import COORDINATOR, OPERATOR
-from swarm.model.plan import LeftOut
 from swarm.protocol.events import CommonEvent, MessageReceived, PeerGone, PeerSeen, Tick
 from swarm.protocol.messages import Body, CommandKind, MissionPhase, OperatorCommand, TaskEdit
 from swarm.protocol.timing import Timing
@@ -125,12 +124,13 @@ def test_a_task_that_was_chosen_claimed_and_done(tape: Tape) -> None:
 
 
 def test_a_task_that_the_plan_leaves_out_tells_why(tape: Tape) -> None:
-    left = {TaskId("t1"): LeftOut.ENERGY}
-    plan = Plan("test", "greedy", {}, 0.0, {}, None, None, 1, 0.0, 0, schedule={}, left_out=left)
-    tape.note(plan, 0.0)
+    tape.say(COORDINATOR, epoch("u0", "u1", number=2, left_out={"energy": ("t1",)}), 3.0)
 
     explained = explain_task(tape.stop(), "t1")
 
+    assert texts(explained)[-1] == (
+        "Epoch 2 leaves out t1 (energy); energy: nobody has the energy for it beside the rest."
+    )
     assert explained.ending == (
         "The plan leaves t1 out: nobody has the energy for it beside the rest. "
         "So t1 is still open as the recording ends, with nobody on the way to it."

@@ -8,13 +8,12 @@ from typing import Any
 import pytest
 
 from coordinator.recording.foxglove_topics import FoxgloveTopics
-from swarm.model import Mission, TaskId, Zone, ZoneId
+from swarm.model import Mission, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
-from swarm.model.plan import LeftOut, Plan
 from swarm.protocol.field_messages import ZoneEdit, ZoneSpec
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, StatusPhase
 from tests.support import field_registers
-from tests.support.builders import entries_of
+from tests.support.builders import entries_of, epoch
 from tests.support.observed_mission import Teller
 from tests.unit.coordinator.terminal.test_field_picture import pasture
 
@@ -99,13 +98,11 @@ def test_a_base_tells_who_is_there_and_a_uav_its_sortie(teller: Teller) -> None:
 
 
 def test_what_the_plan_leaves_out_is_told_with_the_reason(teller: Teller) -> None:
-    left = {TaskId("t1"): LeftOut.ENERGY}
-    plan = Plan("test", "greedy", {}, 0.0, {}, None, None, 1, 0.0, 0, schedule={}, left_out=left)
     viewer = Viewer()
     viewer.look(teller)
     assert facts(viewer.scenes["tasks"]["left out"]) == {}
 
-    teller.mission_state.take_plan(plan)
+    teller.say(COORDINATOR, epoch("u0", "u1", number=2, left_out={"energy": ("t1",)}))
     viewer.look(teller)
 
     assert facts(viewer.scenes["tasks"]["left out"]) == {"t1": "energy"}

@@ -18,10 +18,9 @@ from swarm.model import Base, BaseId, Mission, TaskId, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.model.plan import LeftOut, Plan
 from swarm.protocol.field_messages import ZoneEdit, ZoneSpec
-from swarm.protocol.messages import MissionPhase, PlanEpoch
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, StatusPhase
 from tests.support import field_registers
-from tests.support.builders import brief_of, entries_of, mission, task, uav
+from tests.support.builders import brief_of, entries_of, epoch, mission, task, uav
 from tests.support.observed_mission import Teller
 
 POND = Zone(ZoneId("pond"), ((40.0, 20.0), (60.0, 20.0), (60.0, 60.0), (40.0, 60.0)))
@@ -76,8 +75,8 @@ def test_zones_and_bases_are_on_the_map_and_in_the_status(teller: Teller) -> Non
 def test_ways_lead_round_zones_by_bases_and_home(teller: Teller) -> None:
     teller.say(COORDINATOR, field_registers.brief_of(pasture()))
     lists = {"u0": ("t1", "t0"), "u1": ()}
-    epoch = PlanEpoch(2, MissionPhase.RUNNING, "guided", ("u0", "u1"), 0.0, "", lists)
-    teller.say(COORDINATOR, epoch)
+    said = replace(epoch("u0", "u1", number=2, rule="guided"), routes=lists)
+    teller.say(COORDINATOR, said)
     teller.say("u0", Claim(ClaimPhase.HELD, "t1", 0.0, 0, 14.0))
 
     view = scene_of(teller.mission_state, 1.0).uavs[0]
@@ -152,11 +151,27 @@ def test_zones_that_the_operator_draws_stand_among_his_orders_and_on_the_map(
 
 
 def test_what_the_plan_leaves_out_is_told_with_the_reason(teller: Teller) -> None:
+    teller.say(COORDINATOR, epoch("u0", "u1", number=2, left_out={"energy": ("t1",)}))
+
+    text = picture(teller.mission_state)
+    told = status_as_json(scene_of(teller.mission_state, 1.0))
+
+    assert "left out     t1 (energy)" in text
+    assert "○ 1 open  ◌ 1 left out" in text
+    assert "◌t1" in text
+    assert told["left_out"] == {"t1": "energy"}
+    assert told["tasks"]["open"] == 2
+
+
+def test_who_has_the_plan_shows_what_it_leaves_out_before_the_mission_begins() -> None:
+    flown = pasture()
+    teller = Teller(flown)
     left = {TaskId("t1"): LeftOut.ENERGY}
     plan = Plan("test", "greedy", {}, 0.0, {}, None, None, 1, 0.0, 0, schedule={}, left_out=left)
     teller.mission_state.take_plan(plan)
 
-    text = picture(teller.mission_state)
+    assert "left out     t1 (energy)" in picture(teller.mission_state)
 
-    assert "left out     t1 (energy)" in text
-    assert status_as_json(scene_of(teller.mission_state, 1.0))["left_out"] == {"t1": "energy"}
+    teller.begin()  # what the epoch says counts from here on
+
+    assert "left out" not in picture(teller.mission_state)

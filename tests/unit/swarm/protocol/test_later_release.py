@@ -36,7 +36,7 @@ def grown(value: Any) -> Any:
     return {**inner, "later": LATER}
 
 
-TABLES = ("dropped", "heads", "routes", "success", "survival")
+TABLES = ("dropped", "heads", "left_out", "routes", "success", "survival")
 
 
 def said_later(said: Message) -> bytes:

@@ -136,12 +136,29 @@ def test_an_older_release_need_not_say_what_has_a_wire_default(
     name, value = list(parts[6].items())[-1]
     del parts[6][name]
     older = msgpack.packb(parts)
+    monkeypatch.setattr(wire, "WIRE_DEFAULTS", {})
     assert Codec(MISSION).decode(said.key, older) is None, "without a default it is needed"
 
     monkeypatch.setattr(wire, "WIRE_DEFAULTS", {parts[5]: {name: value}})
 
     assert heard(said, older) == said
     assert heard(said, encode(said)) == said, "who says it is heard as before"
+
+
+def test_an_epoch_of_a_release_that_says_nothing_of_it_leaves_nothing_out() -> None:
+    said = message("coordinator", epoch("u0", left_out={"energy": ("t1",)}))
+    parts: list[Any] = msgpack.unpackb(encode(said))
+    assert parts[0] == 1, "releases that do not know of it hear the epoch all the same"
+    del parts[6]["left_out"]
+
+    assert heard(said, msgpack.packb(parts)).body == epoch("u0")
+
+
+def test_an_epoch_has_room_to_leave_out_all_of_five_thousand_tasks() -> None:
+    tasks = tuple(f"t{n:063}" for n in range(5000))
+    said = message("coordinator", epoch("u0", left_out={"nobody can": tasks}))
+
+    assert heard(said, encode(said)) == said
 
 
 def test_wire_defaults_are_of_fields_that_there_are() -> None:
