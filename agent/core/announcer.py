@@ -31,7 +31,7 @@ class Announcer:
         self._replica = replica
         self._timing = timing
         self._claim_key = KeySpace(register_writer.mission).claim(register_writer.writer)
-        self._note = ""
+        self._note = self._caution = ""
         self._turn = 0
         self._announce_at_s: float | None = None
         self._status_at_s: float | None = None
@@ -39,11 +39,15 @@ class Announcer:
     @property
     def note(self) -> str:
         """What the status tells a reader about the state of affairs."""
-        return self._note
+        return self._note or self._caution
 
     def explain(self, note: str) -> None:
         """From now on the status tells a reader this; "" where there is nothing to tell."""
         self._note = note[:_LONGEST_NOTE]
+
+    def caution(self, caution: str) -> None:
+        """From now on it tells this while there is nothing else to tell; "": no more."""
+        self._caution = caution[:_LONGEST_NOTE]
 
     @property
     def incarnation(self) -> int:

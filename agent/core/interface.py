@@ -151,9 +151,10 @@ class NotReady:
 
 @dataclass(frozen=True, slots=True)
 class Caution:
-    """What a person should know of the vehicle; nothing else follows from it."""
+    """What a person should know of the vehicle from now on; nothing else follows from it."""
 
     reason: str
+    """In words; empty: what was said before is over."""
 
 
 @dataclass(frozen=True, slots=True)

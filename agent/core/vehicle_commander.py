@@ -75,8 +75,6 @@ class VehicleCommander(AgentPart):
         """Whether it has been in the air in this life."""
         self._reason = ""
         """Why it flies home."""
-        self._caution = ""
-        """What people should know of it in flight."""
 
     # -- what it reports ------------------------------------------------------------
 
@@ -90,10 +88,8 @@ class VehicleCommander(AgentPart):
                     self._announcer.explain(reason)
                 self._log("vehicle not ready", reason=reason)
             case Caution(reason):
-                self._caution = reason
-                if self._machine.state in TAKES_TARGETS:  # else the note says what it waits for
-                    self._announcer.explain(reason)
-                self._log("caution", reason=reason)
+                self._announcer.caution(reason)
+                self._log("caution" if reason else "no caution any more", reason=reason)
             case FlightLimits():
                 self._tasking.introduce(report)
             case Arrived(leg):
@@ -134,7 +130,7 @@ class VehicleCommander(AgentPart):
         """It is in the air and under command."""
         if self._machine.allows(Trigger.VEHICLE_READY):
             self._flown = True
-            self._announcer.explain(self._caution)
+            self._announcer.explain("")
             self._mission_view.take_off()
             self._tasking.begin(now_s)
             self._log("airborne")

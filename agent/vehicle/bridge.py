@@ -369,5 +369,4 @@ class Bridge:
             return
         session.override.want(self._raises_jerk and activity.in_our_hands)
         session.say(*session.override.advance(session.now_s))
-        if complaint := session.override.take_complaint():
-            session.tell_caution("parameter", complaint)
+        session.tell_caution("parameter", session.override.complaint)

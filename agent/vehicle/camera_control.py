@@ -12,6 +12,10 @@ from agent.vehicle.conversation import Conversation
 from agent.vehicle.firmware.profile import Firmware
 
 CAMERA_TAG = "camera"
+_COMPLAINTS = {
+    CommandOutcome.REFUSED: "it does not take the trigger of its camera",
+    CommandOutcome.UNANSWERED: "the trigger of its camera does not answer",
+}
 
 
 class CameraControl:
@@ -42,7 +46,4 @@ class CameraControl:
         if ended.tag != CAMERA_TAG:
             return
         self._ended = True
-        if ended.ending is CommandOutcome.REFUSED:
-            self._conversation.tell_caution("camera", "it does not take the trigger of its camera")
-        elif ended.ending is CommandOutcome.UNANSWERED:
-            self._conversation.tell_caution("camera", "the trigger of its camera does not answer")
+        self._conversation.tell_caution("camera", _COMPLAINTS.get(ended.ending))

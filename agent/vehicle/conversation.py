@@ -38,7 +38,7 @@ class Conversation:
         self.now_s = 0.0
         self._actions: list[BridgeAction] = []
         self._told_not_ready: str | None = None
-        self._told_caution: str | None = None
+        self._told_caution = ""
         self._cautions: dict[str, str] = {}
 
     def send(self, tag: str, command: VehicleCommand) -> None:
@@ -71,11 +71,11 @@ class Conversation:
             self.report(NotReady(reason))
 
     def tell_caution(self, topic: str, reason: str | None) -> None:
-        """Report what people should know of the vehicle, once; None: no more of that topic."""
+        """Report what people should know of the vehicle, when it changes; None: that is over."""
         if reason is None:
             self._cautions.pop(topic, None)
-            return
-        self._cautions[topic] = reason
+        else:
+            self._cautions[topic] = reason
         told = "; ".join(self._cautions.values())
         if told != self._told_caution:
             self._told_caution = told
@@ -83,8 +83,7 @@ class Conversation:
 
     def tell_anew(self) -> None:
         """Another wait begins: what was told may be told again."""
-        self._told_not_ready = self._told_caution = None
-        self._cautions.clear()
+        self._told_not_ready = None
 
     def take_actions(self) -> list[BridgeAction]:
         """What was said and reported, in order, once."""

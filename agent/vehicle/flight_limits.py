@@ -93,10 +93,13 @@ class LimitsCheck:
             session.say(*map(ParameterRead, names))
 
     @property
+    def is_read(self) -> bool:
+        """Whether all is known that will be before it flies."""
+        return self._told
+
+    @property
     def caution(self) -> str | None:
-        """What people should know of the vehicle; None if there is nothing."""
-        if not self._told:
-            return None
+        """What people should know of the vehicle, once that is read; None if there is nothing."""
         told = self._reading.kinematics
         planned_m_s2 = self._session.planned_m_s2
         parts = [f"its {each.name} of {each.value:g} is not believed" for each in told.absurd]

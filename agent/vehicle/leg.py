@@ -351,8 +351,8 @@ class Flying(Activity):
         """Judge speed and arrival."""
         session, told_m_s = self._session, self._session.cruise_speed_m_s
         velocity_enu_m_s = position.velocity_enu_m_s
-        if remark := session.cruise_watch.judge(velocity_enu_m_s, told_m_s, session.now_s):
-            session.tell_caution("speed", remark)
+        session.cruise_watch.judge(velocity_enu_m_s, told_m_s, session.now_s)
+        session.tell_caution("speed", session.cruise_watch.remark)
         self._leg.on_position(position)
 
     def outcome(self) -> Arrived | HandedOver | Refused | None:

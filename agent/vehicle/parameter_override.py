@@ -72,6 +72,7 @@ class ParameterOverride:
         """Say whether it should be as for a flight, or the vehicle's own."""
         if wanted is not self._wanted:
             self._wanted, self._tries, self._next_at_s = wanted, 0, -math.inf
+            self._complaint = None
 
     def on_message(self, message: Inbound) -> None:
         """A value that the vehicle tells."""
@@ -99,10 +100,10 @@ class ParameterOverride:
         """When `advance` has something to do; None if it has not."""
         return None if self._is_as_wanted else self._next_at_s
 
-    def take_complaint(self) -> str | None:
-        """What could not be done so far, in words; once."""
-        complaint, self._complaint = self._complaint, None
-        return complaint
+    @property
+    def complaint(self) -> str | None:
+        """What cannot be done, in words; None as long as it may be."""
+        return None if self._is_as_wanted else self._complaint
 
     @property
     def _is_as_wanted(self) -> bool:

@@ -118,6 +118,11 @@ class FailsafeCheck:
         self._session.say(*map(ParameterRead, names))
 
     @property
+    def is_read(self) -> bool:
+        """Whether all is known that will be before it flies."""
+        return self._settled
+
+    @property
     def objection(self) -> str | None:
         """Why the vehicle is not armed, in words; None if it may be."""
         if self._by_missions or self._config.accept_no_failsafe:

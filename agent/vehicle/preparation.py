@@ -111,11 +111,12 @@ class _Preparation:
         self.failure: str | None = None
         """Why it will not get there; None while it may."""
 
-    @property
-    def caution(self) -> str | None:
-        """What people should know of a vehicle that is armed all the same."""
-        parts = (self._limits.caution, self._failsafes.caution)
-        return "; ".join(part for part in parts if part is not None) or None
+    def tell_cautions(self) -> None:
+        """Tell what people should know of a vehicle that is armed all the same, once it is read."""
+        if self._limits.is_read:
+            self._session.tell_caution("limits", self._limits.caution)
+        if self._failsafes.is_read:
+            self._session.tell_caution("failsafes", self._failsafes.caution)
 
     @property
     def disturbed(self) -> bool:
@@ -491,7 +492,6 @@ class Preparing(Activity):
             self._preparation = _Preparation(session, session.firmware, self.order, ours=self._ours)
         preparation = self._preparation
         preparation.advance(heartbeat)
-        if preparation.caution is not None:
-            session.tell_caution("failsafes", preparation.caution)
+        preparation.tell_cautions()
         if not self.done and preparation.failure is None:
             session.tell_not_ready(_NO_PLACE if preparation.done else preparation.waiting_for)

@@ -253,27 +253,28 @@ _STEEPEST = 0.3
 
 
 class CruiseWatch:
-    """Compares steady ground speeds with the one told, and says once when they fall short."""
+    """Compares steady ground speeds with the one told; they fall short until they do not."""
 
     def __init__(self) -> None:
+        self.remark: str | None = None
+        """That they fall short, for people; None as long as they are not known to."""
         self._since_s = math.inf
         self._first_m_s = 0.0
         self._told = False
 
     def judge(
         self, velocity_enu_m_s: tuple[float, float, float], told_m_s: float, now_s: float
-    ) -> str | None:
-        """Take a velocity on the way to a target; what to tell people, or None."""
+    ) -> None:
+        """Take a velocity on the way to a target; where it is reached now and then, remark once."""
         east_m_s, north_m_s, up_m_s = velocity_enu_m_s
         speed_m_s = math.hypot(east_m_s, north_m_s)
         cruising = speed_m_s >= _LEAST_FRAC * told_m_s and abs(up_m_s) <= _STEEPEST * speed_m_s
         steady = abs(speed_m_s - self._first_m_s) <= _STEADY_FRAC * self._first_m_s
-        if self._told or not cruising or not steady or speed_m_s >= _SHORT_FRAC * told_m_s:
+        short = speed_m_s < _SHORT_FRAC * told_m_s
+        otherwise = short and not self._told if self.remark is None else not short
+        if not (cruising and steady and otherwise):
             self._since_s, self._first_m_s = now_s, speed_m_s
-            return None
-        if now_s - self._since_s < _STEADY_S:
-            return None
-        self._told = True
-        return (
-            f"it flies at {speed_m_s:.1f} m/s, asked for {told_m_s:g}: its own limits forbid more"
-        )
+        elif now_s - self._since_s >= _STEADY_S:
+            self._told = True
+            shown = f"{speed_m_s:.1f} m/s, asked for {told_m_s:g}"
+            self.remark = f"it flies at {shown}: its own limits forbid more" if short else None

@@ -208,3 +208,6 @@ def test_what_people_should_know_of_a_vehicle_is_logged_and_shows_in_flight() ->
 
     agent.happen(VehicleReady(), 9.0)
     assert statuses(agent.run_until(12.0))[-1].note == reason
+
+    agent.happen(Caution(""), 12.0)
+    assert statuses(agent.run_until(15.0))[-1].note == ""

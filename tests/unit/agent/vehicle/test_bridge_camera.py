@@ -112,3 +112,15 @@ def test_a_vehicle_that_does_not_take_it_flies_all_the_same(
 
     assert {*told(flight)} == {15.0, 0.0}
     assert caution in flight.cautions
+
+
+def test_a_camera_that_takes_its_trigger_after_all_is_no_worry_any_more(
+    flight: BridgeFlight,
+) -> None:
+    accepted = [mavlink.MAV_RESULT_ACCEPTED] * 9
+    flight.copter.verdicts[TRIGGER] = [mavlink.MAV_RESULT_UNSUPPORTED, *accepted]
+    flight.order(LINE)
+    flight.run_until(Arrived(2), limit_s=120.0)
+    flight.run(10.0)
+
+    assert flight.cautions == ["it does not take the trigger of its camera", ""]
