@@ -48,6 +48,8 @@ class BaseVisit:
     """When it will have waited for longer than it said."""
     late: bool = False
     """Whether it has."""
+    beside: bool = False
+    """Whether it goes there though all slots are blocked, to come down beside them."""
     hopeless_at_s: float | None = None
     """When it has stood beside slots for long enough that are all blocked."""
 
@@ -136,7 +138,7 @@ class BaseVisits(AgentPart):
         return replace(claim, base=base, stage=stage, sortie_end_s=used_up_s)
 
     def is_hopeless(self, now_s: float) -> bool:
-        """Whether it stands at a base at which it would wait for a slot for ever."""
+        """Whether it has waited beside blocked slots for as long as somebody takes to clear one."""
         hopeless_at_s = self._visit.hopeless_at_s
         beside = self._machine.state is AgentState.BESIDE_SLOTS
         return beside and hopeless_at_s is not None and hopeless_at_s <= now_s
@@ -163,11 +165,16 @@ class BaseVisits(AgentPart):
         arrives_s: float,
         ready_s: float,
         now_s: float,
+        *,
+        beside: bool = False,
     ) -> None:
-        """Fly to ``base`` that way, and claim it: free since then, predicted to be ready then."""
+        """Fly to ``base`` that way, and claim it: free since then, predicted to be ready then.
+
+        To come down ``beside`` its slots it goes though all are blocked.
+        """
         self._machine.take(Trigger.BASE_CHOSEN)
         known_s = now_s + self._timing.objection_window_s
-        self._visit = BaseVisit(held_at_s=known_s, known_at_s=known_s)
+        self._visit = BaseVisit(held_at_s=known_s, known_at_s=known_s, beside=beside)
         self._fly(way, base)
         self._say(
             Claim(
@@ -255,7 +262,8 @@ class BaseVisits(AgentPart):
             self._wait_on_ground(base, now_s)
             return
         on_slot = self._machine.state is AgentState.SWAPPING
-        if base is None or (not on_slot and self.is_blocked(base)):
+        in_vain = base is not None and self.is_blocked(base) and not (on_slot or visit.beside)
+        if base is None or in_vain:
             self.break_off("the base is gone" if base is None else "its slots are blocked", now_s)
         elif self._machine.state is AgentState.ABOVE_BASE:
             self._land_or_wait(base, now_s)
@@ -360,7 +368,7 @@ class BaseVisits(AgentPart):
             self._visit.hopeless_at_s = None
             self._land_or_wait(base, now_s)
         elif self._visit.hopeless_at_s is None:
-            self._visit.hopeless_at_s = now_s + self._timing.stalemate_s
+            self._visit.hopeless_at_s = now_s + self._timing.clear_s
 
     def stand(self, now_s: float, *, found: bool = False) -> bool:
         """The vehicle stands at a base already: have its battery looked after from there.

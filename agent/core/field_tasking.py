@@ -279,8 +279,9 @@ class FieldTasking(Tasking):
         self._leave_ground(now_s)
         self._become_free(since_s)
         self._free.to_decide = False
-        times_s = haven.arrives_s, haven.ready_s
-        self._visits.set_off(haven.way, haven.base.id, since_s, self._rank, *times_s, now_s)
+        times_s = haven.arrives_s, haven.ready_s, now_s
+        to = haven.way, haven.base.id
+        self._visits.set_off(*to, since_s, self._rank, *times_s, beside=haven.beside)
 
     def _visit_over(self, since_s: float, adrift: bool) -> None:
         self._become_free(since_s, adrift=adrift)
@@ -445,7 +446,10 @@ class FieldTasking(Tasking):
         self._free.retry_at_s = earliest(self._free.retry_at_s, *until_s)
 
     def head_home_in_time(self, now_s: float) -> None:
-        """Who has found nothing to do flies to the nearest base before its battery is used up."""
+        """Who has found nothing to do flies to the nearest base before its battery is used up.
+
+        Where lost UAVs block its slots and no other is in reach it comes down beside them.
+        """
         if not self._in_field:
             return
         self._home_at_s = self._leaves_at_s(now_s)
@@ -458,8 +462,8 @@ class FieldTasking(Tasking):
         home = self._havens.home(now_s)
         idles = self._machine.state is AgentState.IDLE
         base = home.base if idles and home is not None else None
-        haven = None if base is None else self._havens.reach(base, now_s)
-        if haven is not None and self._havens.is_usable(haven.base, now_s):
+        haven = None if base is None else self._havens.refuge(base, now_s)
+        if haven is not None:
             self._visit_base(haven, now_s)
             self._home_at_s = self._leaves_at_s(now_s)
 

@@ -6,7 +6,7 @@ visit itself (agent.core.base_visits), and bases on the way to tasks (agent.core
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from agent.core.base_visits import BaseVisits
 from agent.core.context import AgentContext, AgentPart
@@ -29,6 +29,9 @@ class Haven:
     """Mission time at which it is above it."""
     ready_s: float
     """Mission time at which its battery is full there, as far as it is known who is ahead."""
+    beside: bool = False
+    """Whether it goes there to come down beside slots that are all blocked, until somebody clears
+    one; it is ready when nobody knows."""
 
 
 class Havens(AgentPart):
@@ -84,6 +87,19 @@ class Havens(AgentPart):
         arrives_s = mission_s + way.duration_s
         ready_s = self._begins_s(base, arrives_s, mission_s) + base.swap_s
         return Haven(base, way, arrives_s, ready_s)
+
+    def refuge(self, name: str, now_s: float) -> Haven | None:
+        """That base, to be on the ground there in time, beside the slots if they are blocked.
+
+        None where it cannot go, or the vehicle would not land.
+        """
+        haven = self.reach(name, now_s)
+        if haven is None or name in self._refused.left_alone(now_s):
+            return None
+        if not self._visits.is_blocked(haven.base):
+            return haven
+        ready_s = haven.arrives_s + haven.base.swap_s  # as if somebody cleared a slot by then
+        return replace(haven, ready_s=ready_s, beside=True)
 
     def instead_of_waiting(self, now_s: float) -> Haven | None:
         """Where the UAV, which waits above a base longer than it said, is ready earlier.

@@ -192,7 +192,7 @@ def limit_s(case: Case) -> float:
     if any(each.kind is DisturbanceKind.HOLD for each in case.schedule):
         last_s += OPERATOR_PATIENCE_S
     if is_field(mission):
-        work_s += _field_work_s(mission, across_s)
+        work_s += _field_work_s(mission, across_s) + TIMING.clear_s
     waits_s = TIMING.abandon_s + TIMING.stalemate_s + 2.0 * TIMING.reconsider_s + 60.0
     return max(last_s, appears_s) + work_s + waits_s
 

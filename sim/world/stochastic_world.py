@@ -352,4 +352,6 @@ def _limit_s(fate: Realization, timing: Timing) -> float:
     swap_s = max((base.swap_s for base in mission.bases), default=0.0)
     work_s += len(mission.tasks) * len(mission.uavs) * swap_s + opens_s
     waits_s = timing.abandon_s + timing.stalemate_s + timing.linger_s + 2.0 * timing.silence_s
+    if mission.bases:
+        waits_s += timing.clear_s
     return _START_S + appears_s + 4.0 * work_s + 10.0 * waits_s

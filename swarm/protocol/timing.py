@@ -73,6 +73,9 @@ class Timing:
     stalemate_s: float = 45.0
     """How long a fleet may leave open tasks to themselves before the mission ends; longer than
     `reconsider_s`, or no task that was refused would be considered again."""
+    clear_s: float = 600.0
+    """How long a vehicle stands beside slots that lost ones block before it leaves the mission:
+    a person may come and clear one."""
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):

@@ -477,10 +477,54 @@ def test_beside_slots_that_stay_blocked_its_mission_is_over(script: Script) -> N
 
     agent.lose("u1", BUDGET_S + 5.0)
 
-    agent.run_until(BUDGET_S + 5.0 + agent.timing.stalemate_s - 0.1)
+    agent.run_until(BUDGET_S + 5.0 + agent.timing.clear_s - 0.1)
     assert agent.state() is AgentState.BESIDE_SLOTS
-    agent.run_until(BUDGET_S + 5.0 + agent.timing.stalemate_s + 1.0)
+    agent.run_until(BUDGET_S + 5.0 + agent.timing.clear_s + 1.0)
     assert agent.phase is ClaimPhase.OUT
+
+
+def test_who_learns_above_a_base_that_its_slots_are_blocked_comes_down_beside_them(
+    script: Script,
+) -> None:
+    """As who has come down before: it waits for somebody to clear a slot, and goes on then."""
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    agent.run_until(49.0)
+    agent.arrive(50.0)
+    script.items = []
+
+    agent.lose("u1", 60.0)
+    assert agent.state() is AgentState.IDLE, "it may yet find something to do"
+    agent.run_until(BUDGET_S - 0.5 * agent.timing.patience_s)
+    assert (agent.state(), agent.stage) == (AgentState.FLYING_TO_BASE, BaseStage.APPROACHING)
+    assert agent.claim is not None
+    assert agent.claim.arrives_s is not None
+    assert agent.claim.arrives_s <= BUDGET_S
+    agent.arrive(BUDGET_S - 0.4 * agent.timing.patience_s)
+    agent.run_until(BUDGET_S)
+    assert (agent.state(), agent.stage) == (AgentState.BESIDE_SLOTS, BaseStage.PARKED)
+    assert agent.phase is ClaimPhase.HELD
+
+    agent.vouched("u1", BUDGET_S + 0.9 * agent.timing.clear_s)
+    agent.run_until(BUDGET_S + 0.9 * agent.timing.clear_s + 1.0)
+    assert (agent.state(), agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+
+
+def test_on_its_way_to_stand_beside_blocked_slots_it_takes_one_that_is_cleared(
+    script: Script,
+) -> None:
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    script.items = []
+    agent.lose("u1", 20.0)
+    agent.be_at((60.0, 0.0, 10.0), None)
+    agent.run_until(BUDGET_S - 5.0)
+    assert agent.state() is AgentState.FLYING_TO_BASE
+
+    agent.vouched("u1", BUDGET_S - 2.0)
+    agent.arrive(BUDGET_S - 1.0)
+
+    assert (agent.state(), agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
 
 
 @pytest.mark.parametrize("above", [False, True])
