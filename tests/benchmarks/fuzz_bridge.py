@@ -18,7 +18,8 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 
 from swarm.runtime.clock import SystemClock
-from tests.support.bridge_fuzz import FLAVOURS, Episode, Setting, setting_of, settings
+from tests.support.bridge_fuzz import Episode, Setting, setting_of, settings
+from tests.support.hostile_input import FLAVOURS
 
 _REPLAY = "SETTING:SEED:EPISODE, as a failure prints it"
 _MOST_FAILURES = 10
