@@ -32,11 +32,9 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from collections.abc import Iterator
-from dataclasses import dataclass, field, fields, is_dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-import shapely
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import (
@@ -66,85 +64,38 @@ from agent.vehicle.firmware.ardupilot import ArduCopter
 from agent.vehicle.firmware.px4 import Px4Copter
 from agent.vehicle.session import BridgeEvent, TimePassed
 from agent.vehicle.transitions import SUCCESSORS
-from swarm.model import Zone
 from swarm.model.frames import enu_from_wgs84
+from tests.support.bridge_memory import see_buffer, see_memory
+from tests.support.broken_rule import BrokenError, hold
 from tests.support.fake_copter import (
-    ARM,
     INTERVAL,
-    REPOSITION,
-    SET_MODE,
-    SPEED,
-    SWITCH_FENCE,
-    TAKEOFF,
     FakeCopter,
 )
-from tests.support.fake_fences import EXCLUSION, FENCE, INCLUSION
+from tests.support.fake_fences import FENCE
 from tests.support.fake_px4 import FakePx4
+from tests.support.phase_commands import (
+    COMMANDS,
+    COMMANDS_OF_MISSIONS,
+    GIVES_WAY,
+    IN_OUR_HANDS,
+    LIMITS,
+    MISSION_ITEMS,
+    MISSION_MESSAGES,
+    MISSION_READING,
+    TRIGGER,
+    WAYPOINT,
+    WITHOUT_MISSION,
+)
+from tests.support.zone_watch import TOLERANCE_M, Point, ZoneWatch
 
 _MODE_ENABLED = 1.0
-_TOLERANCE_M = 0.1
-"""Of places on the wire: 1e-7 degrees, and heights of 24 bits."""
-_MOST_REMEMBERED = 4_000
-"""Entries of all collections that a bridge holds, its constants included."""
-_MOST_BUFFERED_BYTES = 280
-"""The longest frame there is."""
 _PLACES = 50
-_ASIDE_M = 1.0
-"""So much nearer than the margin of a zone a way may come."""
 _CLIMB_ASIDE_M = 0.5
 _FASTEST_M_S = 50.0
 _RECENT = 20
 _LEAP_M = 25.0
 """Two places that a vehicle told are farther apart only if it was somewhere else."""
 _FAKES: dict[type, type[FakeCopter]] = {ArduCopter: FakeCopter, Px4Copter: FakePx4}
-_MISSION_MESSAGES = {
-    "MISSION_COUNT",
-    "MISSION_ITEM_INT",
-    "MISSION_REQUEST_INT",
-    "MISSION_REQUEST_LIST",
-    "MISSION_ACK",
-    "MISSION_SET_CURRENT",
-    "MISSION_CLEAR_ALL",
-}
-_MISSION_READING = {"MISSION_REQUEST_INT", "MISSION_REQUEST_LIST", "MISSION_ACK"}
-_WITHOUT_MISSION = {FlightPhase.IDLE, FlightPhase.RETURNING}
-_WAYPOINT = 16
-_COMMANDS: dict[FlightPhase, set[int]] = {
-    FlightPhase.IDLE: {ARM, SWITCH_FENCE},
-    FlightPhase.PREPARING: {SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, SWITCH_FENCE},
-    FlightPhase.HOVERING: {REPOSITION, SWITCH_FENCE},
-    FlightPhase.FLYING: {REPOSITION, SWITCH_FENCE},
-    FlightPhase.HOLDING: {SET_MODE, REPOSITION, ARM, SWITCH_FENCE},
-    FlightPhase.RETURNING: {SET_MODE, REPOSITION, SWITCH_FENCE},
-    FlightPhase.LANDING: {SET_MODE, REPOSITION, ARM, SWITCH_FENCE},
-    FlightPhase.STANDING: set(),
-    FlightPhase.HANDED_OVER: set(),
-}
-"""What may be commanded in each phase, beside requests for messages; motors are started
-while preparing only."""
-_TRIGGER = 206
-_IN_OUR_HANDS = _COMMANDS.keys() - {FlightPhase.IDLE, FlightPhase.HANDED_OVER}
-"""In which a camera may be told to take pictures, or none."""
-_COMMANDS_OF_MISSIONS: dict[FlightPhase, set[int]] = {
-    FlightPhase.HOVERING: {SET_MODE, SPEED},
-    FlightPhase.FLYING: {SET_MODE, SPEED},
-}
-"""What else, if targets are missions."""
-_LIMITS, _GIVES_WAY = 222, 92
-_MISSION_ITEMS = {_WAYPOINT, 20, SPEED, _LIMITS, _GIVES_WAY}
-"""A place, and the speed, the time for targets and the way home around it."""
-
-
-Point = tuple[float, float, float]
-
-
-class BrokenError(AssertionError):
-    """A bridge did what it must not do."""
-
-
-def hold(condition: bool, what: str) -> None:
-    if not condition:
-        raise BrokenError(what)
 
 
 @dataclass(frozen=True, slots=True)
@@ -197,10 +148,7 @@ class BridgeWatch:
         self._heard_again = False
         """Since it was handed over."""
         self._mode_wanted: set[tuple[float, float]] = set()
-        self._zones: list[tuple[Zone, float]] = []
-        """To be kept out of, and how far."""
-        self._told_zones: set[Zone] = set()
-        """All that it was ever told."""
+        self._zones = ZoneWatch(bridge)
         self._base_m: Point | None = None
         """Where it was last ordered to land for another battery."""
         self._swap_leg: int | None = None
@@ -222,8 +170,7 @@ class BridgeWatch:
         if isinstance(event, Prepare | GoTo | Hold | Return | Swap):
             self._note(event)
         elif isinstance(event, KeepOut):
-            self._zones = [(zone, event.margin_m) for zone in event.zones]
-            self._told_zones.update(event.zones)
+            self._zones.tell(event)
         elif isinstance(event, Ready):
             let = before is FlightPhase.STANDING and event.leg == self._swap_leg
             self._may_start |= let
@@ -242,7 +189,9 @@ class BridgeWatch:
             else:
                 self._take(action)
         actions += self._see_deadline(now_s)
-        self._see_size()
+        if self.steps % 500 == 0:
+            see_memory(self.bridge)
+        see_buffer(self.bridge)
         return actions
 
     def _note(self, order: Prepare | GoTo | Hold | Return | Swap) -> None:
@@ -300,56 +249,32 @@ class BridgeWatch:
             return
         hold(not self._silent, f"{name} after a hand-over: {message}")
         if getattr(message, "mission_type", 0) == FENCE:
-            self._see_fence(name, message, phases)
+            places_m = [*self._heres_m, *self._task.told_m]
+            self._zones.see_fence(name, message, phases, places_m)
             return
         if name == "PARAM_REQUEST_READ" and message.param_id in self.fake.fence_names:
-            hold(bool(self._told_zones), "asks for its fence, though there is no zone")
+            hold(self._zones.any_told, "asks for its fence, though there is no zone")
         elif name in ("PARAM_REQUEST_READ", "PARAM_SET"):
             hold(FlightPhase.PREPARING in phases, f"{name} while {before}, {after}")
             readable = self.fake.failsafe_names | self.fake.limit_names
             read = readable if name == "PARAM_REQUEST_READ" else frozenset()
             known = message.param_id in read or message.param_id in self.fake.speed_names
             hold(known, f"{name} of {message.param_id}")
-        elif name in _MISSION_MESSAGES:
+        elif name in MISSION_MESSAGES:
             hold(missions, f"{name}, though commanded by targets")
-            if name not in _MISSION_READING:
+            if name not in MISSION_READING:
                 self._see_giving(name, phases)
             if name == "MISSION_ITEM_INT":
-                hold(message.command in _MISSION_ITEMS, f"mission item {message.command}")
-                if message.command == _WAYPOINT:
+                hold(message.command in MISSION_ITEMS, f"mission item {message.command}")
+                if message.command == WAYPOINT:
                     self._see_place(message, phases)
-                elif message.command in (_LIMITS, _GIVES_WAY):
+                elif message.command in (LIMITS, GIVES_WAY):
                     hold(self.fake is FakeCopter, "an item that it does not know")
                     hold(message.param1 >= 1.0, f"gives way for {message.param1} s")
         elif name in ("COMMAND_LONG", "COMMAND_INT"):
             self._see_command(message, phases, missions=missions)
         else:
             hold(False, f"sends {name}")
-
-    def _see_fence(self, name: str, message: Any, phases: set[FlightPhase]) -> None:
-        """What is put there is part of a zone, and the vehicle has been outside of it."""
-        hold(bool(self._told_zones), f"{name} of a fence, though there is no zone")
-        hold(phases != {FlightPhase.STANDING}, f"{name} of a fence while {phases}")
-        if name in ("MISSION_COUNT", "MISSION_ITEM_INT"):
-            hold(phases != {FlightPhase.IDLE}, f"{name} of a fence while {phases}")
-        if name != "MISSION_ITEM_INT":
-            return
-        hold(message.command in (INCLUSION, EXCLUSION), f"fence item {message.command}")
-        config = self.bridge.config
-        corner_m = enu_from_wgs84(
-            config.origin, message.x / 1e7, message.y / 1e7, config.origin.alt_m
-        )[:2]
-        places_m = [*self._heres_m, *self._task.told_m]
-        outside = False
-        for zone in self._told_zones:
-            at = any(math.dist(corner_m, corner) <= _TOLERANCE_M for corner in zone.polygon_enu_m)
-            shape = zone.shape()
-            outside |= at and any(
-                shape.contains(shapely.Point(place_m[:2])) is zone.inclusive
-                for place_m, _ in places_m
-                if all(map(math.isfinite, place_m[:2]))
-            )
-        hold(outside, f"a fence put over it, or of no zone, at {corner_m}")
 
     def _see_jerk(self, message: Any) -> None:
         """Raised in flight only; put back at any time, even after a hand-over: it moves nothing."""
@@ -364,17 +289,17 @@ class BridgeWatch:
     def _see_giving(self, name: str, phases: set[FlightPhase]) -> None:
         """What a vehicle that is no longer prepared was being given is given whole, or cleared."""
         hold(not isinstance(self._ordered, Return), f"{name} in the step of a return")
-        if phases <= _WITHOUT_MISSION:
+        if phases <= WITHOUT_MISSION:
             ends = self._gave_mission and name != "MISSION_SET_CURRENT"
             hold(phases == {FlightPhase.IDLE} and ends, f"{name} {phases}")
         self._gave_mission = True
 
     def _see_command(self, message: Any, phases: set[FlightPhase], *, missions: bool) -> None:
-        allowed = set[int]().union(*(_COMMANDS[phase] for phase in phases))
+        allowed = set[int]().union(*(COMMANDS[phase] for phase in phases))
         if missions:
-            allowed |= set[int]().union(*(_COMMANDS_OF_MISSIONS.get(p, set()) for p in phases))
-        if phases & _IN_OUR_HANDS:
-            allowed.add(_TRIGGER)
+            allowed |= set[int]().union(*(COMMANDS_OF_MISSIONS.get(p, set()) for p in phases))
+        if phases & IN_OUR_HANDS:
+            allowed.add(TRIGGER)
         hold(message.command in allowed, f"commands {message.command} while {phases}")
         match message.command:
             case 192:
@@ -433,27 +358,15 @@ class BridgeWatch:
         places_m, base_m = self._task.places_m, self._task.base_m
         ordered = any(_near(place_m, place) for place in (*places_m, *self._left_m))
         if FlightPhase.LANDING in phases and base_m is not None:
-            ordered |= math.dist(place_m[:2], base_m[:2]) <= _TOLERANCE_M
+            ordered |= math.dist(place_m[:2], base_m[:2]) <= TOLERANCE_M
         if self._task.climbs:
             here_m = [told_m for told_m, _ in self._task.told_m]
             ordered |= any(
                 math.dist(place_m[:2], told_m[:2]) <= _CLIMB_ASIDE_M for told_m in here_m
             )
-        self._see_zones(place_m)
+        from_m = [told for told, _ in (*self._task.told_m, *self._heres_m)]
+        self._zones.see_way(place_m, [*from_m, *self._task.places_m])
         hold(ordered, f"sent to {place_m}, not to {places_m[-3:]}")
-
-    def _see_zones(self, place_m: Point) -> None:
-        from_m = [*(told for told, _ in self._task.told_m), *self._task.places_m]
-        from_m += [told for told, _ in self._heres_m]
-        for zone, margin_m in self._zones:
-            shape, near_m = zone.shape(), max(0.0, margin_m - _ASIDE_M)
-            kept_m = [(*each[:2],) for each in from_m if all(map(math.isfinite, each))]
-            lines = [shapely.LineString([each, place_m[:2]]) for each in kept_m]
-            beside = any(shapely.distance(shape, line) >= near_m - _TOLERANCE_M for line in lines)
-            inside = any(
-                shape.dwithin(shapely.Point(each), near_m + _TOLERANCE_M) for each in kept_m
-            )
-            hold(beside or inside, f"sent to {place_m}, behind zone {zone.id}")
 
     def _is_borne_out(self, place_m: Point) -> bool:
         """Whether the vehicle told it is there, and another place from which it can have come."""
@@ -547,13 +460,6 @@ class BridgeWatch:
                     self._take(action)
         raise BrokenError(f"wants to be called at {deadline_s} for ever, now is {now_s}")
 
-    def _see_size(self) -> None:
-        buffered = len(self.bridge.codec._framer._buffer)
-        hold(buffered <= _MOST_BUFFERED_BYTES, f"keeps {buffered} bytes")
-        if self.steps % 500 == 0:
-            size = sum(len(part) for part in _collections(self.bridge, set()))
-            hold(size <= _MOST_REMEMBERED, f"remembers {size} things")
-
 
 def _fenced(place_m: Point, config: BridgeConfig) -> Point:
     """That place, or the one nearest to it that is a little within the fence."""
@@ -568,23 +474,4 @@ def _fenced(place_m: Point, config: BridgeConfig) -> Point:
 
 
 def _near(a: Point, b: Point) -> bool:
-    return math.dist(a[:2], b[:2]) <= _TOLERANCE_M and abs(a[2] - b[2]) <= _TOLERANCE_M
-
-
-def _collections(thing: Any, seen: set[int]) -> Iterator[Any]:
-    """Every collection that ``thing`` holds, however deep, text and bytes left out."""
-    if id(thing) in seen or isinstance(thing, str | bytes | int | float | type):
-        return
-    seen.add(id(thing))
-    if isinstance(thing, dict):
-        yield thing
-        parts: Any = [*thing.keys(), *thing.values()]
-    elif isinstance(thing, list | tuple | set | frozenset) or type(thing).__name__ == "deque":
-        yield thing
-        parts = list(thing)
-    elif is_dataclass(thing):
-        parts = [getattr(thing, each.name) for each in fields(thing)]
-    else:
-        parts = list(getattr(thing, "__dict__", {}).values())
-    for part in parts:
-        yield from _collections(part, seen)
+    return math.dist(a[:2], b[:2]) <= TOLERANCE_M and abs(a[2] - b[2]) <= TOLERANCE_M

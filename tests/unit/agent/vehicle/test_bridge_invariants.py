@@ -25,7 +25,8 @@ from agent.vehicle.messages import (
 from agent.vehicle.session import BridgeEvent, LinkOpened, TimePassed
 from tests.support.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.support.bridge_fuzz import Episode, Setting, setting_of, settings
-from tests.support.bridge_watch import BridgeWatch, BrokenError
+from tests.support.bridge_watch import BridgeWatch
+from tests.support.broken_rule import BrokenError
 from tests.support.fake_copter import ARM, REPOSITION, FakeCopter
 from tests.support.hostile_input import FLAVOURS
 from tests.support.mavlink_frames import frame
