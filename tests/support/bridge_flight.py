@@ -23,11 +23,17 @@ from agent.vehicle.config import BridgeConfig
 from agent.vehicle.conversation import SendBytes
 from agent.vehicle.session import BridgeEvent, BytesReceived, LinkOpened, TimePassed
 from agent.vehicle.signing import Signing, SigningKey
+from swarm.model import Zone, ZoneId
 from swarm.model.frames import Origin
 from tests.support.fake_copter import FakeCopter
 
 ORIGIN = Origin(47.397742, 8.545594, 488.0)
 START = Prepare((5.0, 0.0, 10.0), 4.0)
+WALL = Zone(ZoneId("wall"), ((20.0, -40.0), (30.0, -40.0), (30.0, 30.0), (20.0, 30.0)))
+BEHIND = (50.0, 0.0, 10.0)
+"""As seen from there, beyond the wall."""
+ROUND = ((17.0, 35.0, 10.0), (33.0, 35.0, 10.0))
+"""Corners of the way there."""
 STEP_S = 0.05
 """Of virtual time; twice for every position that the vehicle reports."""
 RATE_HZ = 10.0

@@ -6,29 +6,18 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import Arrived, GoTo, Held, Hold, Home, Return
-from agent.vehicle.config import BridgeConfig, CommandStyle
-from tests.support.bridge_flight import ORIGIN, BridgeFlight
-from tests.support.fake_copter import FakeCopter
-from tests.support.fake_px4 import FakePx4
+from tests.support.bridge_flight import BridgeFlight
 
 TRIGGER = mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST
-STYLES = [CommandStyle.REPOSITION, CommandStyle.MISSION]
 BEGIN, CORNER, END = (5.0, 20.0, 10.0), (25.0, 40.0, 10.0), (50.0, 40.0, 10.0)
 TO_LINE = GoTo(1, BEGIN, trigger_m=0.0)
 LINE = GoTo(2, END, via_enu_m=(CORNER,), trigger_m=15.0)
 
 
-@pytest.fixture(params=[FakeCopter, FakePx4], ids=["arducopter", "px4"])
-def fake(request: pytest.FixtureRequest) -> type[FakeCopter]:
-    kind: type[FakeCopter] = request.param
-    return kind
-
-
-@pytest.fixture(params=STYLES, ids=[style.value for style in STYLES])
-def flight(fake: type[FakeCopter], request: pytest.FixtureRequest) -> BridgeFlight:
+@pytest.fixture
+def flight(flight: BridgeFlight) -> BridgeFlight:
     """Of a vehicle whose camera takes what it is told."""
-    config = BridgeConfig(1, ORIGIN, command=request.param)
-    flight = BridgeFlight(fake(ORIGIN), config).prepared()
+    flight.prepared()
     flight.copter.verdicts[TRIGGER] = [mavlink.MAV_RESULT_ACCEPTED] * 9
     return flight
 

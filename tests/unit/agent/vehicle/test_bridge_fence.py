@@ -25,8 +25,10 @@ from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.fence_items import fence_areas
 from swarm.model import Zone, ZoneId
 from tests.support.bridge_flight import (
+    BEHIND,
     ORIGIN,
     START,
+    WALL,
     BridgeFlight,
     Spoil,
     rough_link,
@@ -36,7 +38,6 @@ from tests.support.fake_copter import SWITCH_FENCE, FakeCopter
 from tests.support.fake_fences import EXCLUSION, FENCE, INCLUSION, Corner
 from tests.support.fake_px4 import FakePx4
 
-WALL = Zone(ZoneId("wall"), ((20.0, -40.0), (30.0, -40.0), (30.0, 30.0), (20.0, 30.0)))
 FIELD = Zone(
     ZoneId("field"),
     ((-200.0, -200.0), (200.0, -200.0), (200.0, 200.0), (-200.0, 200.0)),
@@ -45,21 +46,6 @@ FIELD = Zone(
 FAR = Zone(ZoneId("far"), ((-60.0, 60.0), (-50.0, 60.0), (-50.0, 70.0)))
 AROUND = Zone(ZoneId("new"), ((0.0, -15.0), (15.0, -15.0), (15.0, 15.0), (0.0, 15.0)))
 """The start, in the air and on the ground."""
-BEHIND = (50.0, 0.0, 10.0)
-ROUND = ((17.0, 35.0, 10.0), (33.0, 35.0, 10.0))
-STYLES = [CommandStyle.REPOSITION, CommandStyle.MISSION]
-
-
-@pytest.fixture(params=[FakeCopter, FakePx4], ids=["arducopter", "px4"])
-def fake(request: pytest.FixtureRequest) -> type[FakeCopter]:
-    kind: type[FakeCopter] = request.param
-    return kind
-
-
-@pytest.fixture(params=STYLES, ids=[style.value for style in STYLES])
-def style(request: pytest.FixtureRequest) -> CommandStyle:
-    chosen: CommandStyle = request.param
-    return chosen
 
 
 def flight_of(

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import (
@@ -20,7 +19,7 @@ from agent.core.interface import (
     VehicleReady,
 )
 from agent.vehicle.activity import FlightPhase
-from agent.vehicle.config import BridgeConfig, CommandStyle
+from agent.vehicle.config import BridgeConfig
 from swarm.model.frames import enu_from_wgs84
 from tests.support.bridge_flight import ORIGIN, START, BridgeFlight
 from tests.support.fake_copter import ARM, DENIED, INTERVAL, REPOSITION, SET_MODE, FakeCopter
@@ -29,12 +28,6 @@ from tests.support.fake_px4 import FakePx4
 HOLD = Hold("the operator says so")
 RESUME = replace(START, resume=True)
 FAR, NORTH = (205.0, 0.0, 12.0), (5.0, 40.0, 12.0)
-
-
-@pytest.fixture(params=list(CommandStyle))
-def flight(fake: type[FakeCopter], request: pytest.FixtureRequest) -> BridgeFlight:
-    """Of either firmware, commanded either way."""
-    return BridgeFlight(fake(ORIGIN), BridgeConfig(1, ORIGIN, command=request.param))
 
 
 def under_way(flight: BridgeFlight) -> BridgeFlight:

@@ -9,28 +9,16 @@ import numpy as np
 import pytest
 
 from agent.core.interface import Arrived, GoTo, Home, KeepOut, Refused, Return
-from agent.vehicle.config import BridgeConfig, CommandStyle
+from agent.vehicle.config import BridgeConfig
 from swarm.allocation.legs.obstacles import Obstacles
 from swarm.model import Zone, ZoneId
-from tests.support.bridge_flight import ORIGIN, BridgeFlight
+from tests.support.bridge_flight import BEHIND, ORIGIN, ROUND, WALL, BridgeFlight
 from tests.support.fake_copter import FakeCopter
-from tests.support.fake_px4 import FakePx4
-
-WALL = Zone(ZoneId("wall"), ((20.0, -40.0), (30.0, -40.0), (30.0, 30.0), (20.0, 30.0)))
-ROUND = ((17.0, 35.0, 10.0), (33.0, 35.0, 10.0))
-BEHIND = (50.0, 0.0, 10.0)
-STYLES = [CommandStyle.REPOSITION, CommandStyle.MISSION]
 
 
-@pytest.fixture(params=[FakeCopter, FakePx4], ids=["arducopter", "px4"])
-def fake(request: pytest.FixtureRequest) -> type[FakeCopter]:
-    kind: type[FakeCopter] = request.param
-    return kind
-
-
-@pytest.fixture(params=STYLES, ids=[style.value for style in STYLES])
-def flight(fake: type[FakeCopter], request: pytest.FixtureRequest) -> BridgeFlight:
-    flight = BridgeFlight(fake(ORIGIN), BridgeConfig(1, ORIGIN, command=request.param))
+@pytest.fixture
+def flight(flight: BridgeFlight) -> BridgeFlight:
+    """Prepared, with a wall to fly round."""
     flight.order(KeepOut((WALL,), 3.0))
     return flight.prepared()
 

@@ -26,12 +26,6 @@ VIA = START.position_enu_m
 RETURN = Return("mission ended", via_enu_m=VIA)
 
 
-@pytest.fixture(params=list(CommandStyle))
-def flight(fake: type[FakeCopter], request: pytest.FixtureRequest) -> BridgeFlight:
-    """Of either firmware, commanded either way."""
-    return BridgeFlight(fake(ORIGIN), BridgeConfig(1, ORIGIN, command=request.param))
-
-
 def under_way(flight: BridgeFlight) -> BridgeFlight:
     flight.prepared()
     flight.order(GoTo(1, FAR))

@@ -25,27 +25,14 @@ from agent.core.interface import (
     VehicleReady,
 )
 from agent.vehicle.activity import FlightPhase
-from agent.vehicle.config import BridgeConfig, CommandStyle
+from agent.vehicle.config import BridgeConfig
 from swarm.model import Zone, ZoneId
 from tests.support.bridge_flight import ORIGIN, BridgeFlight
 from tests.support.fake_copter import ARM, REPOSITION, SET_MODE, TAKEOFF, FakeCopter
-from tests.support.fake_px4 import FakePx4
 
 BASE = (5.0, 0.0, 0.0)
 ABOVE = (5.0, 0.0, 10.0)
 SWAP = Swap(3, BASE, 20.0, 4.0)
-STYLES = [CommandStyle.REPOSITION, CommandStyle.MISSION]
-
-
-@pytest.fixture(params=[FakeCopter, FakePx4], ids=["arducopter", "px4"])
-def fake(request: pytest.FixtureRequest) -> type[FakeCopter]:
-    kind: type[FakeCopter] = request.param
-    return kind
-
-
-@pytest.fixture(params=STYLES, ids=[style.value for style in STYLES])
-def config(request: pytest.FixtureRequest) -> BridgeConfig:
-    return BridgeConfig(1, ORIGIN, command=request.param)
 
 
 def landed(fake: type[FakeCopter], config: BridgeConfig, percent: int = 30) -> BridgeFlight:
