@@ -8,8 +8,9 @@ agents report (`FleetReports`), mission time (`PacedClock`), and the story (`Mis
 from __future__ import annotations
 
 from collections import Counter, deque
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
+from itertools import chain
 from typing import TYPE_CHECKING
 
 from coordinator.mission_view.fleet_reports import FleetReports
@@ -41,6 +42,7 @@ from swarm.protocol.fields import Point
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import (
     REVOKED_INCARNATION,
+    Body,
     Message,
     MissionConfig,
     MissionPhase,
@@ -52,7 +54,7 @@ from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.sync import QuestionTimer
 from swarm.protocol.timing import StallDetector, Timing, earliest
-from swarm.protocol.uav_messages import AttemptResult, Choice, ClaimPhase, Outcome, Status
+from swarm.protocol.uav_messages import AttemptResult, Choice, Claim, ClaimPhase, Outcome, Status
 
 if TYPE_CHECKING:
     from coordinator.mission_view.ways import FleetWays, UavWays
@@ -139,6 +141,7 @@ class MissionState:
                 if message.writer == COORDINATOR:
                     self._hear_coordinator(message, now_s)
                 self.take_note(message, now_s)
+                ask |= self._names_unknown(message.body)
             case SnapshotsReceived(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):
@@ -416,6 +419,21 @@ class MissionState:
             self.lost.remove(UavId(writer))
             self._narrator.back(writer, now_s)
         return missed
+
+    def _names_unknown(self, body: Body) -> bool:
+        """Whether it names a task not heard of: others have been told, as by an operator's shell
+        that has no link to this process.
+        """
+        named: Iterable[str] = ()
+        match body:
+            case PlanEpoch():
+                named = chain(*body.routes.values(), *body.left_out.values())
+            case Claim(task=str() as task):
+                named = (task,)
+            case _:
+                pass
+        board = self.replica.board
+        return self.replica.brief is not None and any(task not in board for task in named)
 
     def _is_newcomer(self, writer: str) -> bool:
         """Whether it is a UAV whose first words may have been said before they could be heard."""

@@ -4,12 +4,24 @@ from __future__ import annotations
 
 import pytest
 
+from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.scene import LEFT_OUT, TAKEN, scene_of
 from coordinator.mission_view.story import EventKind
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.events import SnapshotsReceived
-from swarm.protocol.messages import MissionPhase, Snapshot
-from tests.support.builders import MISSION, brief_of, epoch, message, mission, task, uav
+from swarm.protocol.events import Ask, MessageReceived, SnapshotsReceived
+from swarm.protocol.messages import Body, MissionPhase, Snapshot
+from swarm.protocol.timing import Timing
+from tests.support.builders import (
+    MISSION,
+    brief_of,
+    entries_of,
+    epoch,
+    held,
+    message,
+    mission,
+    task,
+    uav,
+)
 from tests.support.observed_mission import Teller
 
 
@@ -112,3 +124,21 @@ def test_what_is_left_open_in_the_end_stays_left_out(teller: Teller) -> None:
 
     assert teller.mission_state.left_out == {"t2": "energy"}
     assert len(told(teller)) == 1
+
+
+def test_who_hears_of_a_task_that_it_does_not_know_asks_for_it() -> None:
+    """As of one by an operator to whom it has no link."""
+    flown = mission([uav("u0")], [task("t0", 10.0)])
+    state = MissionState(flown, Timing())
+    state.start(0.0)
+
+    def wishes(body: Body, counter: int, now_s: float, writer: str = COORDINATOR) -> list[object]:
+        fact = MessageReceived(message(writer, body, counter))
+        return list(state.step(fact, now_s))
+
+    assert wishes(brief_of(flown), 1, 10.0) == []
+    assert wishes(entries_of(flown)[0], 2, 10.0) == []
+    assert wishes(epoch("u0"), 3, 10.0) == []
+    assert wishes(epoch("u0", left_out={"energy": ("op1",)}), 4, 20.0) == [Ask()]
+    assert wishes(held("op2", 20.0), 1, 30.0, "u0") == [Ask()]
+    assert wishes(held("t0", 40.0), 2, 40.0, "u0") == []
