@@ -257,7 +257,12 @@ class StartGate:
         sequence = () if self.plan is None else self.plan.sequence or ()
         lists = {} if self.plan is None else self.plan.routes
         routes = {str(uav): tuple(map(str, tasks)) for uav, tasks in lists.items()}
-        left_out = {} if self.plan is None else by_reason(self.plan.left_out)
+        left_out: dict[str, tuple[str, ...]] = {}
+        brief = self._replica.brief
+        if self.plan is not None and self.plan.left_out and brief is not None:
+            # Of other missions releases that fly them, too, could not read it.
+            if is_of_field(mission_of(self._replica, self._mission.name, brief)):
+                left_out = by_reason(self.plan.left_out)
         return PlanEpoch(
             1, phase, self._method, tuple(sequence), 0.0, reason[:200], routes, left_out
         )

@@ -91,7 +91,7 @@ class ReplanPolicy:
             return None
         if not found.is_settled:
             return self._wanted(found, epoch, now_s)
-        if not found.taking_part:  # they may come back
+        if found.field is None or not found.taking_part:  # who is lost may come back
             return None
         beyond = {LeftOut.NOBODY_CAN.value: found.open_tasks} if found.open_tasks else {}
         return _leaving_out(epoch, beyond, now_s=found.now_s)

@@ -26,7 +26,6 @@ from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import GuidedRule, rule_by_name, team_arrays
 from swarm.kernels.rollout import guided_choice
-from swarm.model.plan import LeftOut
 from swarm.protocol.board import (
     TaskBoard,
     TaskState,
@@ -426,16 +425,13 @@ def complete_lists(situation: Situation, new: Lists) -> Lists:
 def left_out_by(situation: Situation, lists: Lists) -> dict[str, tuple[str, ...]]:
     """Open tasks that are on none of ``lists``, by why; see `swarm.model.plan.LeftOut`.
 
-    Without the field's constraints those that nobody who takes part can do.
+    Nothing without the field's constraints: releases that fly such missions, too, cannot read it.
     """
-    if situation.field is not None:
-        from coordinator.planner.field_online import left_out_by as left_out_in_field
+    if situation.field is None:
+        return {}
+    from coordinator.planner.field_online import left_out_by as left_out_in_field
 
-        return left_out_in_field(situation.field, lists)
-    problem, state = situation.problem, situation.state
-    beyond = state.open & ~problem.capable[state.active].any(axis=0)
-    tasks = tuple(str(problem.task_ids[task]) for task in np.flatnonzero(beyond).tolist())
-    return {LeftOut.NOBODY_CAN.value: tasks} if tasks else {}
+    return left_out_in_field(situation.field, lists)
 
 
 def worth_to_go(situation: Situation, lists: Lists) -> tuple[int, float]:

@@ -83,7 +83,7 @@ SIGNED_HERE: Final = "signed, but no keys here"
 UNKNOWN_VERSION: Final = "unknown version"
 _VERSIONS: Final = (SCHEMA_VERSION, FIELD_VERSION)
 
-WIRE_DEFAULTS: Final[Mapping[str, Mapping[str, object]]] = {"epoch": {"left_out": {}}}
+WIRE_DEFAULTS: Final[Mapping[str, Mapping[str, object]]] = {}
 """By kind, what a field means that an older release does not say; of fields that were added
 to the end of a body under the `SCHEMA_VERSION` in force."""
 

@@ -77,6 +77,7 @@ _OF_BRIEFS: Final = ("bases", "zones", "wind_enu_m_s", "zone_margin_m", "band_m"
 SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
     UavSpec: frozenset({"acceleration_m_s2", *_OF_UAVS}),
     MissionConfig: frozenset(_OF_BRIEFS),
+    PlanEpoch: frozenset({"left_out"}),
     TaskEntry: _OF_TASKS,
     TaskEdit: _OF_TASKS,
     Claim: frozenset(_OF_CLAIMS),
@@ -88,7 +89,13 @@ SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
 """Fields that came with `FIELD_VERSION`; left out where they are as by default, so that a statement
 that has none of them is to the last byte what every release understands."""
 FIELD_DEFAULTS: Final[dict[type, dict[str, object]]] = {
-    part: {field.name: field.default for field in dataclasses.fields(part) if field.name in names}
+    part: {
+        field.name: field.default
+        if field.default_factory is dataclasses.MISSING
+        else field.default_factory()
+        for field in dataclasses.fields(part)
+        if field.name in names
+    }
     for part, names in SINCE_FIELD.items()
 }
 """What they are then."""
