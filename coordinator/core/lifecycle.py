@@ -257,12 +257,9 @@ class StartGate:
         sequence = () if self.plan is None else self.plan.sequence or ()
         lists = {} if self.plan is None else self.plan.routes
         routes = {str(uav): tuple(map(str, tasks)) for uav, tasks in lists.items()}
-        left_out: dict[str, tuple[str, ...]] = {}
-        brief = self._replica.brief
-        if self.plan is not None and self.plan.left_out and brief is not None:
-            # Of other missions releases that fly them, too, could not read it.
-            if is_of_field(mission_of(self._replica, self._mission.name, brief)):
-                left_out = by_reason(self.plan.left_out)
+        # Of other missions releases that fly them, too, could not read it.
+        tells = self.plan is not None and bool(self.plan.left_out) and self._is_in_field
+        left_out = by_reason(self.plan.left_out) if self.plan is not None and tells else {}
         return PlanEpoch(
             1, phase, self._method, tuple(sequence), 0.0, reason[:200], routes, left_out
         )
@@ -280,6 +277,11 @@ class StartGate:
     def _fleet(self) -> tuple[UavId, ...]:
         brief = self._replica.brief
         return () if brief is None else tuple(UavId(uav.id) for uav in brief.uavs)
+
+    @property
+    def _is_in_field(self) -> bool:
+        replica, brief = self._replica, self._replica.brief
+        return brief is not None and is_of_field(mission_of(replica, self._mission.name, brief))
 
     @property
     def _open_tasks(self) -> set[str]:
