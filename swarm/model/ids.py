@@ -1,4 +1,4 @@
-"""Identifiers of UAVs, tasks, bases and zones; each is one chunk of a bus key."""
+"""Identifiers of UAVs, tasks, bases, zones and areas; each is one chunk of a bus key."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ UavId = NewType("UavId", str)
 TaskId = NewType("TaskId", str)
 BaseId = NewType("BaseId", str)
 ZoneId = NewType("ZoneId", str)
+AreaId = NewType("AreaId", str)
 
 AUTHORITY = "authority"
 """Name of the mission authority among the writers on the bus; it signs the roster."""

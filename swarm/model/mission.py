@@ -1,4 +1,4 @@
-"""A mission: its UAVs, its tasks, its bases and zones, its horizon and its defaults."""
+"""A mission: its UAVs, its tasks and areas, its bases and zones, its horizon and its defaults."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
+from swarm.model.areas import Area
 from swarm.model.frames import Origin
 from swarm.model.ids import RESERVED, BaseId, TaskId, UavId, require_id
 from swarm.model.zones import Zone
@@ -191,12 +192,14 @@ class Mission:
     """Paths stay that far away from zones [m]; >= 0."""
     band_m: tuple[float, float] | None = None
     """Heights above the ground that may be used [m]; None: each UAV in its own layer."""
+    areas: tuple[Area, ...] = ()
+    """What some of the tasks cover together; the lines of each are among the tasks."""
     schema: int = field(default=1, compare=False)
     """Of the file that it is from; 2 whenever it has constraints. Plans of such tell schedules."""
 
     def __post_init__(self) -> None:
         require_id(self.name, "mission name")
-        if self.schema == 1 and self.constraints:
+        if self.schema == 1 and (self.constraints or self.areas):
             object.__setattr__(self, "schema", 2)
         if not (math.isfinite(self.horizon_s) and self.horizon_s > 0.0):
             raise ValueError(f"horizon_s must be > 0, not {self.horizon_s}")
@@ -208,6 +211,7 @@ class Mission:
             ("task", [task.id for task in self.tasks]),
             ("base", [base.id for base in self.bases]),
             ("zone", [zone.id for zone in self.zones]),
+            ("area", [area.id for area in self.areas]),
         ):
             if len(set(ids)) != len(ids):
                 raise ValueError(f"{what} ids must differ: {ids}")

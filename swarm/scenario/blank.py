@@ -17,6 +17,7 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from swarm.scenario.draft import PAD_SPACING_M, horizon_for
 from swarm.scenario.edition import EDITIONS
 from swarm.scenario.shapes import (
+    AreaTable,
     BaseTable,
     MissionTable,
     OriginTable,
@@ -44,7 +45,7 @@ _IN_DEGREES: Mapping[str, str] = {
 _ABOUT: Mapping[str, Mapping[str, str]] = {
     "": {
         "schema": "Version of this format. One of version 1 has nothing of wind, heights, energy, "
-        "bases, zones, windows and lines.",
+        "bases, zones, windows, lines and areas.",
         "name": "Name of the mission: what --mission and swarm status call it. Letters, digits, "
         "'_', '-' and '.'.",
         "tasks_from": "A file beside this one whose points are tasks, too: a QGroundControl .plan, "
@@ -54,6 +55,7 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "uav": "",
         "base": "",
         "zone": "",
+        "area": "",
         "task": "",
     },
     "mission": {
@@ -116,6 +118,33 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "ceiling_m": "Greatest height of it above the origin [m]. Absent: unlimited.",
         "inclusive": "true: keeps out of all that is not inside, instead of what is.",
     },
+    "area": {
+        "id": "An area to be covered by lines; these are tasks, called field-a-01, field-a-02, …",
+        "polygon_m": "Corners round it [m east, m north], convex or not; lines between them do not "
+        "cross. What lies in zones or nearer than their margin is cut off.",
+        "polygon": "Instead of polygon_m: corners by latitude and longitude [deg].",
+        "holes_m": "Holes in it, where nothing is to be covered: polygons as polygon_m.",
+        "value": "m of all its lines together, shared out by length.",
+        "spacing_m": "Between neighbouring lines at most [m].",
+        "trigger_m": "A picture every so many metres along the lines [m]. Absent: none.",
+        "camera": "Instead of spacing_m and trigger_m: a known camera (sony-a6000-16mm, …; a wrong "
+        "name tells all), or its numbers: sensor_width_mm, sensor_height_mm, focal_length_mm, "
+        "image_width_px and image_height_px, maybe landscape (true: the longer side across the "
+        "flight) and exposure_s (0.001). Takes the height and both overlaps.",
+        "height_m": "Lines are flown that high above the origin [m]. Absent: in the UAV's layer.",
+        "sidelap_frac": "Share of a picture that is on those of the next line, too.",
+        "frontlap_frac": "Share of a picture that is on the next one of its line, too.",
+        "heading_deg": "Of the lines, clockwise from north [deg]. Absent: the direction with the "
+        "fewest turns.",
+        "max_line_m": "Longer lines are cut into equal parts, so that UAVs can share them [m]. "
+        "Absent: none is.",
+        "kind": "What the rest says of a task is said of every line.",
+        "service_s": "",
+        "appears_s": "",
+        "due_s": "",
+        "opens_s": "",
+        "closes_s": "",
+    },
     "task": {
         "id": "Name of the task: what reports and swarm task call it.",
         "position_m": "Where it is [m east, m north] of the origin; a third number is the height "
@@ -147,6 +176,7 @@ _TABLES: Mapping[str, type[BaseModel]] = {
     "uav": UavTable,
     "base": BaseTable,
     "zone": ZoneTable,
+    "area": AreaTable,
     "task": TaskTable,
 }
 _EXAMPLES: Mapping[tuple[str, str], str] = {
@@ -172,6 +202,21 @@ _EXAMPLES: Mapping[tuple[str, str], str] = {
     ("zone", "floor_m"): "0.0",
     ("zone", "ceiling_m"): "120.0",
     ("zone", "inclusive"): "false",
+    ("area", "polygon"): "[[47.394, 8.546], [47.394, 8.549], [47.396, 8.546]]",
+    ("area", "holes_m"): "[[[50.0, -310.0], [80.0, -310.0], [50.0, -280.0]]]",
+    ("area", "trigger_m"): "20.0",
+    ("area", "camera"): '"dji-phantom-4-pro"',
+    ("area", "height_m"): "60.0",
+    ("area", "sidelap_frac"): "0.7",
+    ("area", "frontlap_frac"): "0.8",
+    ("area", "heading_deg"): "30.0",
+    ("area", "max_line_m"): "400.0",
+    ("area", "kind"): '"photograph"',
+    ("area", "service_s"): "0.0",
+    ("area", "appears_s"): "60.0",
+    ("area", "due_s"): "300.0",
+    ("area", "opens_s"): "60.0",
+    ("area", "closes_s"): "240.0",
     ("uav", "success"): "{ t1 = 0.9 }",
     ("uav", "survival"): "{ t1 = 0.99 }",
     ("uav", "kind"): '"quad"',
@@ -193,6 +238,12 @@ _EXAMPLES: Mapping[tuple[str, str], str] = {
 _ENTRIES: Mapping[str, Mapping[str, object]] = {
     "base": {"id": "b1", "position_m": [0.0, -20.0]},
     "zone": {"id": "z1", "polygon_m": [[300.0, 200.0], [400.0, 200.0], [300.0, 300.0]]},
+    "area": {
+        "id": "field-a",
+        "polygon_m": [[0.0, -400.0], [300.0, -400.0], [300.0, -250.0], [0.0, -250.0]],
+        "value": 40.0,
+        "spacing_m": 25.0,
+    },
     "task": {"id": "t1", "position_m": [60.0, 0.0], "value": 1.0},
 }
 """Tables that the file may have none of, as they could be."""
@@ -260,6 +311,7 @@ def _lines(blank: Blank, mission: Mission) -> Iterator[str]:
         yield from _entry("uav", given, explained=number == 0)
     yield from _commented("base")
     yield from _commented("zone")
+    yield from _commented("area")
     for number, task in enumerate(mission.tasks):
         given = {
             "id": task.id,

@@ -22,24 +22,31 @@ def check(document: Document) -> list[Finding]:
     uavs = list(entries(document, "uav"))
     tasks = list(entries(document, "task"))
     bases = list(entries(document, "base"))
+    areas = list(entries(document, "area"))
     of_edition: Iterable[Finding]
     if edition_of(document) == 1:
         of_edition = _impossible_tasks(document, uavs, tasks)
     else:  # where a task that nobody can do is left out, which a plan tells
-        from swarm.scenario.keep_out import field_faults  # plain missions never load it
+        from swarm.scenario.area_faults import area_faults  # plain missions never load these
+        from swarm.scenario.keep_out import field_faults
 
-        of_edition = field_faults(document)
+        of_edition = [*field_faults(document), *area_faults(document)]
     return [
         *_doubled_ids("uav", uavs),
         *_doubled_ids("task", tasks),
         *_doubled_ids("base", bases),
         *_doubled_ids("zone", entries(document, "zone")),
+        *_doubled_ids("area", areas),
         *_reserved_ids(uavs),
         *misplaced(document, "uav", uavs),
         *misplaced(document, "task", tasks),
         *misplaced(document, "base", bases),
         # Without an array of tasks every reference is unknown; that says nothing new.
-        *(_unknown_references(uavs, tasks) if isinstance(document.get("task"), list) else ()),
+        *(
+            _unknown_references(uavs, tasks, areas)
+            if isinstance(document.get("task"), list)
+            else ()
+        ),
         *of_edition,
     ]
 
@@ -61,19 +68,20 @@ def _reserved_ids(uavs: list[Entry]) -> Iterator[Finding]:
             yield Finding(("uav", index, "id"), problem, "give the UAV another id")
 
 
-def _unknown_references(uavs: list[Entry], tasks: list[Entry]) -> Iterator[Finding]:
-    names = {
-        name
-        for _, task in tasks
-        for name in (task.get("id"), task.get("kind"))
-        if isinstance(name, str)
-    }
+def _unknown_references(
+    uavs: list[Entry], tasks: list[Entry], areas: list[Entry]
+) -> Iterator[Finding]:
+    """Of lines of areas it is known how they are called once these are cut."""
+    named = [task.get(key) for _, task in tasks for key in ("id", "kind")]
+    named += [area.get("kind") for _, area in areas]
+    names = {name for name in named if isinstance(name, str)}
+    lines = tuple(f"{area.get('id')}-" for _, area in areas)
     hints = _HINTS
     for index, uav in uavs:
         for table in ("success", "survival"):
             chances = uav.get(table)
             for name in chances if isinstance(chances, Mapping) else ():
-                if name in names:
+                if name in names or name.startswith(lines):
                     continue
                 meant = close_match(name, names) if hints > 0 else None
                 hints -= 1

@@ -1,6 +1,6 @@
 """A scenario in which nothing is wrong becomes a mission: places in metres, data of the model.
 
-Leaves out: every check.
+Leaves out: every check, and which lines areas are cut into (swarm.scenario.area_faults).
 """
 
 from __future__ import annotations
@@ -8,11 +8,33 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from swarm.model import Base, BaseId, Mission, Origin, Task, TaskId, Uav, UavId, Zone, ZoneId
+from swarm.model import (
+    Area,
+    AreaId,
+    Base,
+    BaseId,
+    Camera,
+    Mission,
+    Origin,
+    Task,
+    TaskId,
+    Uav,
+    UavId,
+    Zone,
+    ZoneId,
+)
 from swarm.model.frames import enu_from_wgs84
+from swarm.model.rings import Ring
 
 if TYPE_CHECKING:
-    from swarm.scenario.shapes import BaseTable, Scenario, TaskTable, UavTable, ZoneTable
+    from swarm.scenario.shapes import (
+        AreaTable,
+        BaseTable,
+        Scenario,
+        TaskTable,
+        UavTable,
+        ZoneTable,
+    )
 
 _Point = tuple[float, float, float]
 
@@ -38,6 +60,7 @@ def mission_of(scenario: Scenario) -> Mission:
         wind_enu_m_s=(east_m_s, north_m_s),
         zone_margin_m=rules.zone_margin_m,
         band_m=None if rules.band_m is None else (rules.band_m[0], rules.band_m[1]),
+        areas=tuple(_area(area, origin) for area in scenario.area),
         schema=scenario.version,
     )
 
@@ -68,20 +91,53 @@ def _base(base: BaseTable, origin: Origin | None) -> Base:
 
 
 def _zone(zone: ZoneTable, origin: Origin | None) -> Zone:
-    if zone.polygon_m is not None:
-        corners = [_point_enu_m(corner) for corner in zone.polygon_m]
-    else:
-        corners = _on_ground_enu_m(zone.polygon or (), origin)
+    polygon, holes = _rings_enu_m(zone, origin)
     return Zone(
         id=ZoneId(zone.id),
-        polygon_enu_m=tuple(corner[:2] for corner in corners),
-        holes_enu_m=tuple(
-            tuple(_point_enu_m(corner)[:2] for corner in hole) for hole in zone.holes_m
-        ),
+        polygon_enu_m=polygon,
+        holes_enu_m=holes,
         floor_m=zone.floor_m,
         ceiling_m=zone.ceiling_m,
         inclusive=zone.inclusive,
     )
+
+
+def _area(area: AreaTable, origin: Origin | None) -> Area:
+    polygon, holes = _rings_enu_m(area, origin)
+    camera = None if area.camera is None else Camera(**area.camera.model_dump())
+    return Area(
+        id=AreaId(area.id),
+        polygon_enu_m=polygon,
+        value=area.value,
+        holes_enu_m=holes,
+        spacing_m=area.spacing_m,
+        trigger_m=area.trigger_m,
+        camera=camera,
+        height_m=area.height_m,
+        sidelap_frac=area.sidelap_frac,
+        frontlap_frac=area.frontlap_frac,
+        heading_deg=area.heading_deg,
+        max_line_m=area.max_line_m,
+        kind=area.kind,
+        service_s=area.service_s,
+        due_s=area.due_s,
+        opens_s=area.opens_s,
+        closes_s=area.closes_s,
+        appears_s=area.appears_s,
+    )
+
+
+def _rings_enu_m(
+    table: ZoneTable | AreaTable, origin: Origin | None
+) -> tuple[Ring, tuple[Ring, ...]]:
+    """Border and holes."""
+    if table.polygon_m is not None:
+        corners = [_point_enu_m(corner) for corner in table.polygon_m]
+    else:
+        corners = _on_ground_enu_m(table.polygon or (), origin)
+    holes = [[_point_enu_m(corner) for corner in hole] for hole in table.holes_m]
+    polygon = tuple(corner[:2] for corner in corners)
+    return polygon, tuple(tuple(corner[:2] for corner in hole) for hole in holes)
 
 
 def _task(task: TaskTable, origin: Origin | None) -> Task:

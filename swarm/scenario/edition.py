@@ -18,10 +18,10 @@ NEW_KEYS: Mapping[str, Sequence[str]] = {
     "task": ("due_s", "opens_s", "closes_s", "path_m", "path", "trigger_m", "height_m"),
 }
 """What schema 2 adds to the tables of schema 1."""
-NEW_TABLES = ("base", "zone")
+NEW_TABLES = ("base", "zone", "area")
 """Tables of schema 2."""
 _LATER_KEYS: Mapping[str, Sequence[str]] = {"mission": ("separation_m",)}
-_LATER_TABLES: Mapping[str, str] = {"area": "[[area]]", "terrain": "[terrain]"}
+_LATER_TABLES: Mapping[str, str] = {"terrain": "[terrain]"}
 
 
 def edition_of(document: Document) -> int:

@@ -42,7 +42,7 @@ def field_faults(document: Document) -> Iterator[Finding]:
         path: Path = ("zone", index)
         faults = [
             *outline_faults(document, path, entry, POLYGON),
-            *_unsound_rings(path, entry, frame),
+            *unsound_rings(path, entry, frame),
         ]
         yield from faults
         yield from _unsound_heights(path, entry)
@@ -72,7 +72,7 @@ def _slow_uavs(document: Document) -> Iterator[Finding]:
 # -- zones by themselves ------------------------------------------------------------------
 
 
-def _unsound_rings(
+def unsound_rings(
     path: Path, entry: Mapping[str, object], frame: Origin | None
 ) -> Iterator[Finding]:
     """Rings that are no polygons, one by one; then, of sound ones, holes that do not fit."""

@@ -34,7 +34,7 @@ class Outline:
 LINE = Outline("path_m", "path")
 """Of a task, in the place of a position."""
 POLYGON = Outline("polygon_m", "polygon")
-"""Of a zone."""
+"""Of a zone or an area."""
 
 
 def entries(document: Document, name: str) -> Iterator[Entry]:

@@ -96,7 +96,13 @@ def build_mission(document: Document, source: str, tasks: TaskFile | None = None
     scenario, findings = validate(document)
     findings += check(document)
     if scenario is not None and not findings:
-        return mission_of(scenario)
+        mission = mission_of(scenario)
+        if mission.areas:
+            from swarm.scenario.area_faults import with_lines
+
+            mission, findings = with_lines(mission)
+        if not findings:
+            return mission
     first = len(own) if isinstance(own, list) else 0
     here = [finding for finding in findings if not _from_file(finding, first)]
     faults = faults_of(document, source, here)

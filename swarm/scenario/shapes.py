@@ -9,13 +9,14 @@ finite, so that a misplaced exponent is named here and not met as an infinite J.
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Annotated
 
-from pydantic import AfterValidator, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
 from swarm.model.ids import ID_RULE
 from swarm.scenario.edition import EDITIONS, edition_faults, without_later
-from swarm.scenario.findings import Document, Finding
+from swarm.scenario.findings import Document, Finding, close_match
 from swarm.scenario.validation import (
     PROBABILITY,
     Id,
@@ -26,8 +27,11 @@ from swarm.scenario.validation import (
     validate_tables,
     wrong,
 )
+from swarm.survey.cameras import CAMERAS
 
 _SLOWEST_M_S = 1e-6
+_LONGEST_AREA_ID = 56
+"""So that a number fits behind it."""
 
 
 def _require_speed(speed_m_s: float) -> float:
@@ -84,6 +88,22 @@ def _require_fleet(uavs: list[UavTable]) -> list[UavTable]:
     return uavs
 
 
+def _numbers_of(camera: object) -> object:
+    """Those of a camera that is known by name; anything else as it is."""
+    if not isinstance(camera, str):
+        return camera
+    if camera in CAMERAS:
+        return asdict(CAMERAS[camera])
+    meant = close_match(camera, CAMERAS)
+    raise wrong("{} is no camera that is known" + (f" (did you mean {meant!r}?)" if meant else ""))
+
+
+def _require_short(name: str) -> str:
+    if len(name) > _LONGEST_AREA_ID:
+        raise wrong("{} is too long")
+    return name
+
+
 _Kind = Annotated[str, Field(min_length=1, max_length=64)]
 _Seconds = Annotated[float, Field(ge=0.0, le=1e9)]
 _Metres = Annotated[float, Field(ge=-1e7, le=1e7)]
@@ -96,6 +116,10 @@ _Speed = Annotated[float, Field(le=1e6), AfterValidator(_require_speed)]
 _Share = Annotated[float, AfterValidator(_require_share)]
 _WindSpeed = Annotated[float, Field(ge=-1e6, le=1e6)]
 _Height = Annotated[float, Field(ge=0.0, le=1e6)]
+_Distance = Annotated[float, Field(ge=0.1, le=1e6)]
+_Millimetres = Annotated[float, Field(ge=0.01, le=10_000.0)]
+_Pixels = Annotated[int, Field(ge=1, le=1_000_000)]
+_Overlap = Annotated[float, Field(ge=0.0, le=0.99)]
 
 
 class MissionTable(StrictTable):
@@ -173,8 +197,44 @@ class TaskTable(_Placed):
     closes_s: _Seconds | None = None
     path_m: Annotated[list[_Point], AfterValidator(_require_line)] | None = None
     path: Annotated[list[_Degrees], AfterValidator(_require_line)] | None = None
-    trigger_m: Annotated[float, Field(ge=0.1, le=1e6)] | None = None
+    trigger_m: _Distance | None = None
     height_m: _Metres | None = None
+
+
+class CameraTable(StrictTable):
+    """``camera`` of ``[[area]]``."""
+
+    sensor_width_mm: _Millimetres
+    sensor_height_mm: _Millimetres
+    focal_length_mm: _Millimetres
+    image_width_px: _Pixels
+    image_height_px: _Pixels
+    landscape: bool = True
+    exposure_s: Annotated[float, Field(gt=0.0, le=10.0)] = 0.001
+
+
+class AreaTable(StrictTable):
+    """``[[area]]``."""
+
+    id: Annotated[Id, AfterValidator(_require_short)]
+    polygon_m: list[_Point] | None = None
+    polygon: list[_Degrees] | None = None
+    holes_m: list[list[_Point]] = Field(default_factory=list)
+    value: Annotated[float, Field(ge=0.0, le=1e12)]
+    spacing_m: _Distance | None = None
+    trigger_m: _Distance | None = None
+    camera: Annotated[CameraTable, BeforeValidator(_numbers_of)] | None = None
+    height_m: _Metres | None = None
+    sidelap_frac: _Overlap | None = None
+    frontlap_frac: _Overlap | None = None
+    heading_deg: Annotated[float, Field(ge=-360.0, le=360.0)] | None = None
+    max_line_m: Annotated[float, Field(ge=1.0, le=1e6)] | None = None
+    kind: _Kind | None = None
+    service_s: _Seconds = 0.0
+    due_s: _Seconds | None = None
+    opens_s: _Seconds = 0.0
+    closes_s: _Seconds | None = None
+    appears_s: _Seconds = 0.0
 
 
 class Scenario(StrictTable):
@@ -187,6 +247,7 @@ class Scenario(StrictTable):
     uav: Annotated[list[UavTable], AfterValidator(_require_fleet)]
     base: list[BaseTable] = Field(default_factory=list)
     zone: list[ZoneTable] = Field(default_factory=list)
+    area: list[AreaTable] = Field(default_factory=list)
     task: list[TaskTable]
     tasks_from: Annotated[str, Field(min_length=1)] | None = None
 
@@ -199,6 +260,8 @@ _TABLES: Mapping[tuple[str, ...], TableShape] = {
     ("base",): TableShape.of("[[base]]", BaseTable),
     ("zone",): TableShape.of("[[zone]]", ZoneTable),
     ("task",): TableShape.of("[[task]]", TaskTable),
+    ("area",): TableShape.of("[[area]]", AreaTable),
+    ("area", "camera"): TableShape.of("camera of [[area]]", CameraTable),
 }
 
 _LATITUDE = "a latitude within -90..90 [deg]"
@@ -207,6 +270,17 @@ _ALTITUDE = "a height above mean sea level within -1e5..1e5 [m], such as 488.0"
 _SECONDS = "a number >= 0 and <= 1e9 [s]"
 _SHARE = "a share within 0..1"
 _CORNERS = "corners [[east, north], …], each within -1e7..1e7 [m]"
+_VALUE = "a number >= 0 and <= 1e12, such as value = 5.0"
+_KIND = "a word of 1 to 64 characters"
+_APPEARS = "a number >= 0 and <= 1e9 [s]; 0 if known from the start"
+_DISTANCE = "a distance within 0.1..1e6 [m]"
+_OVERLAP = "a share within 0..0.99, such as 0.7"
+_MILLIMETRES = "a length within 0.01..10000 [mm]"
+_PIXELS = "an integer within 1..1000000"
+_CAMERA = (
+    f"one of {', '.join(CAMERAS)}, or a table of sensor_width_mm, sensor_height_mm, "
+    "focal_length_mm, image_width_px and image_height_px"
+)
 _HEIGHT = "a height above the origin within -1e7..1e7 [m]"
 _RIGHT: Mapping[tuple[str, ...], str] = {
     ("schema",): "schema = 1 or schema = 2",
@@ -232,7 +306,7 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("uav", "survival"): f"a table of task ids or kinds with {PROBABILITY} each",
     ("uav", "success", "*"): PROBABILITY,
     ("uav", "survival", "*"): PROBABILITY,
-    ("uav", "kind"): "a word of 1 to 64 characters",
+    ("uav", "kind"): _KIND,
     ("uav", "acceleration_m_s2"): "a number > 0 and <= 1e6 [m/s²], such as 2.5",
     ("uav", "airspeed_m_s"): "a speed through the air > 0 and <= 1e6 [m/s], such as 12.0",
     ("uav", "endurance_s"): "a number > 0 and <= 1e9 [s], such as endurance_s = 1200.0",
@@ -250,17 +324,44 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("zone", "floor_m"): _HEIGHT,
     ("zone", "ceiling_m"): _HEIGHT,
     ("zone", "inclusive"): "true or false",
+    ("area",): "one table [[area]] per area",
+    ("area", "id"): f"an id of {ID_RULE}, but {_LONGEST_AREA_ID} at most",
+    ("area", "polygon_m"): _CORNERS,
+    ("area", "polygon"): "corners [[lat_deg, lon_deg], …]",
+    ("area", "holes_m"): f"an array of holes, each of {_CORNERS}",
+    ("area", "value"): _VALUE,
+    ("area", "spacing_m"): _DISTANCE,
+    ("area", "trigger_m"): _DISTANCE,
+    ("area", "camera"): _CAMERA,
+    ("area", "camera", "sensor_width_mm"): _MILLIMETRES,
+    ("area", "camera", "sensor_height_mm"): _MILLIMETRES,
+    ("area", "camera", "focal_length_mm"): _MILLIMETRES,
+    ("area", "camera", "image_width_px"): _PIXELS,
+    ("area", "camera", "image_height_px"): _PIXELS,
+    ("area", "camera", "landscape"): "true or false",
+    ("area", "camera", "exposure_s"): "a number > 0 and <= 10 [s], such as 0.001",
+    ("area", "height_m"): _HEIGHT,
+    ("area", "sidelap_frac"): _OVERLAP,
+    ("area", "frontlap_frac"): _OVERLAP,
+    ("area", "heading_deg"): "a direction within -360..360 [deg], clockwise from north",
+    ("area", "max_line_m"): "a length within 1..1e6 [m], such as 400.0",
+    ("area", "kind"): _KIND,
+    ("area", "service_s"): _SECONDS,
+    ("area", "due_s"): _SECONDS,
+    ("area", "opens_s"): _SECONDS,
+    ("area", "closes_s"): _SECONDS,
+    ("area", "appears_s"): _APPEARS,
     ("task", "id"): f"an id of {ID_RULE}",
-    ("task", "value"): "a number >= 0 and <= 1e12, such as value = 5.0",
+    ("task", "value"): _VALUE,
     ("task", "service_s"): _SECONDS,
-    ("task", "kind"): "a word of 1 to 64 characters",
-    ("task", "appears_s"): "a number >= 0 and <= 1e9 [s]; 0 if known from the start",
+    ("task", "kind"): _KIND,
+    ("task", "appears_s"): _APPEARS,
     ("task", "due_s"): _SECONDS,
     ("task", "opens_s"): _SECONDS,
     ("task", "closes_s"): _SECONDS,
     ("task", "path_m"): "two points or more, [[east, north], …], each within -1e7..1e7 [m]",
     ("task", "path"): "two points or more, [[lat_deg, lon_deg], …]",
-    ("task", "trigger_m"): "a distance within 0.1..1e6 [m]",
+    ("task", "trigger_m"): _DISTANCE,
     ("task", "height_m"): _HEIGHT,
 } | {
     (table, key): right

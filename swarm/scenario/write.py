@@ -11,8 +11,9 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 
-from swarm.model import Base, Mission, Task, Uav, Zone
+from swarm.model import Area, Base, Camera, Mission, Task, Uav, Zone
 from swarm.scenario.plain import nobody_can
+from swarm.survey.cameras import name_of
 
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -23,12 +24,13 @@ def format_scenario(mission: Mission) -> str:
     A mission whose numbers pass the limits of the format (see
     swarm.scenario.shapes) is written all the same and refused when read.
     """
+    areas, rest = _areas_and_other_tasks(mission)
     head: dict[str, object] = {"name": mission.name}
-    if not mission.tasks:
+    if not rest:
         head["task"] = []
     rules = ("horizon_s", "success_default", "survival_default", "reattempt_failed")
     table = {key: getattr(mission, key) for key in rules} | _field_rules(mission)
-    uavs, tasks = [_uav(uav) for uav in mission.uavs], [_task(task) for task in mission.tasks]
+    uavs, tasks = [_uav(uav) for uav in mission.uavs], [_task(task) for task in rest]
     zones = [_zone(zone) for zone in mission.zones]
     schema = 1 if is_plain(mission) else 2
     blocks = [[f"schema = {schema}", *toml_lines(head)], ["[mission]", *toml_lines(table)]]
@@ -37,6 +39,7 @@ def format_scenario(mission: Mission) -> str:
     blocks += [["[[uav]]", *toml_lines(uav)] for uav in uavs]
     blocks += [["[[base]]", *_base_lines(base)] for base in mission.bases]
     blocks += [["[[zone]]", *toml_lines(zone)] for zone in zones]
+    blocks += [["[[area]]", *_area_lines(area)] for area in areas]
     blocks += [["[[task]]", *toml_lines(task)] for task in tasks]
     return "\n\n".join("\n".join(block) for block in blocks) + "\n"
 
@@ -46,6 +49,7 @@ def is_plain(mission: Mission) -> bool:
     return not (
         mission.bases
         or mission.zones
+        or mission.areas
         or _field_rules(mission)
         or any(_given(uav, _OF_UAV) for uav in mission.uavs)
         or any(task.path_enu_m or _given(task, _OF_TASK) for task in mission.tasks)
@@ -53,11 +57,30 @@ def is_plain(mission: Mission) -> bool:
     )
 
 
+def _areas_and_other_tasks(mission: Mission) -> tuple[Sequence[Area], Sequence[Task]]:
+    """The areas whose lines are as cutting them gives, and the tasks that are no such lines.
+
+    Of any other area the lines that are left are tasks as all others.
+    """
+    if not mission.areas:
+        return (), mission.tasks
+    from swarm.survey.lines import Uncut, line_tasks
+
+    by_id = {task.id: task for task in mission.tasks}
+    areas = []
+    for area in mission.areas:
+        lines = line_tasks(area, mission.zones, mission.zone_margin_m)
+        if not isinstance(lines, Uncut) and all(by_id.get(line.id) == line for line in lines):
+            areas.append(area)
+    theirs = {line for area in areas for line in area.line_ids}
+    return areas, [task for task in mission.tasks if task.id not in theirs]
+
+
 _OF_UAV = ("acceleration_m_s2", "airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
 _OF_TASK = ("due_s", "opens_s", "closes_s", "trigger_m", "height_m")
 
 
-def _given(item: Uav | Task, names: Sequence[str]) -> dict[str, object]:
+def _given(item: Uav | Task | Area, names: Sequence[str]) -> dict[str, object]:
     """Those of ``names`` that are not as they are by default."""
     defaults = {each.name: each.default for each in fields(item)}
     values = {name: getattr(item, name) for name in names}
@@ -104,6 +127,44 @@ def _zone(zone: Zone) -> dict[str, object]:
         "polygon_m": list(map(list, zone.polygon_enu_m)),
         **{key: value for key, value in more.items() if value is not None},
     }
+
+
+_OF_AREA = (
+    "spacing_m",
+    "trigger_m",
+    "height_m",
+    "sidelap_frac",
+    "frontlap_frac",
+    "heading_deg",
+    "max_line_m",
+    "kind",
+    "service_s",
+    "due_s",
+    "opens_s",
+    "closes_s",
+    "appears_s",
+)
+
+
+def _area_lines(area: Area) -> Iterator[str]:
+    rings: dict[str, object] = {"polygon_m": list(map(list, area.polygon_enu_m))}
+    if area.holes_enu_m:
+        rings["holes_m"] = [list(map(list, hole)) for hole in area.holes_enu_m]
+    yield from toml_lines({"id": area.id, **rings, "value": area.value})
+    if area.camera is not None:
+        yield f"camera = {_camera(area.camera)}"
+    yield from toml_lines(_given(area, _OF_AREA))
+
+
+def _camera(camera: Camera) -> str:
+    """By its name, or by numbers, of which those of pixels are whole."""
+    if (name := name_of(camera)) is not None:
+        return toml_string(name)
+    numbers = {
+        key: str(value) if key.endswith("_px") else toml_value(value)
+        for key, value in asdict(camera).items()
+    }
+    return f"{{ {', '.join(f'{key} = {value}' for key, value in numbers.items())} }}"
 
 
 def _task(task: Task) -> dict[str, object]:

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from swarm.model.ids import ZoneId
-from swarm.model.zones import Corner, Zone
+from swarm.model.rings import Corner
+from swarm.model.zones import Zone
 
 FloatArray = npt.NDArray[np.float64]
 

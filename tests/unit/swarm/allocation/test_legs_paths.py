@@ -8,7 +8,8 @@ import pytest
 
 from swarm.allocation.legs import PathPlanner
 from swarm.model.ids import ZoneId
-from swarm.model.zones import Corner, Zone
+from swarm.model.rings import Corner
+from swarm.model.zones import Zone
 from tests.support.plain_paths import PlainZones, random_zones
 
 FloatArray = npt.NDArray[np.float64]

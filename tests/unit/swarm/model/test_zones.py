@@ -6,7 +6,8 @@ import re
 import pytest
 
 from swarm.model.ids import ZoneId
-from swarm.model.zones import Corner, Zone
+from swarm.model.rings import Corner
+from swarm.model.zones import Zone
 
 SQUARE: tuple[Corner, ...] = ((0.0, 0.0), (10.0, 0.0), (10.0, 10.0), (0.0, 10.0))
 HOLE: tuple[Corner, ...] = ((2.0, 2.0), (4.0, 2.0), (3.0, 4.0))

@@ -15,6 +15,7 @@ from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.scenario import blank, format_scenario, load_scenario, parse_scenario
 from swarm.scenario.blank import Blank, blank_scenario
 from swarm.scenario.shapes import (
+    AreaTable,
     BaseTable,
     MissionTable,
     OriginTable,
@@ -32,6 +33,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "uav": UavTable,
     "base": BaseTable,
     "zone": ZoneTable,
+    "area": AreaTable,
     "task": TaskTable,
 }
 
@@ -97,15 +99,21 @@ def test_bases_zones_and_windows_in_comments_are_right_when_they_are_taken_in() 
     text = blank_scenario(Blank("field", 1, 1, DEFAULT_ORIGIN))
     commented = re.compile(r"^# (\w+ = |\[\[\w+\]\]$)", re.MULTILINE)
     text = re.sub(
-        r"^# (lat_deg|lon_deg|alt_m|polygon|path|tasks_from) = .*\n", "", text, flags=re.MULTILINE
+        r"^# (lat_deg|lon_deg|alt_m|polygon|path|tasks_from|camera|\w+lap_frac) = .*\n",
+        "",
+        text,
+        flags=re.MULTILINE,
     )
     text = text.replace("position_m = [60.0, 0.0]\n", "")  # for the line that takes its place
 
     mission = parse_scenario(commented.sub(r"\1", text).encode(), "field.toml")
-    (uav,), (base,), (zone,), (task,) = mission.uavs, mission.bases, mission.zones, mission.tasks
+    (uav,), (base,), (zone,), (area,) = mission.uavs, mission.bases, mission.zones, mission.areas
+    task = mission.tasks[0]
     assert (uav.endurance_s, uav.acceleration_m_s2, uav.airspeed_m_s) == (1200.0, 2.5, 12.0)
     assert (base.slots, base.swap_s) == (2, 120.0)
     assert (zone.top_m, len(zone.holes_enu_m), zone.inclusive) == (120.0, 1, False)
+    assert (area.trigger_m, area.kind, area.due_s) == (20.0, "photograph", 300.0)
+    assert [line.id for line in mission.tasks[1:]] == list(area.line_ids) != []
     assert (task.due_s, task.opens_s, task.closes_s, len(task.path_enu_m)) == (
         300.0,
         60.0,

@@ -1,0 +1,1 @@
+"""Areas cut into lines, what these cover, and what a camera sees from them: pure geometry."""
