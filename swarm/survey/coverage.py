@@ -60,8 +60,11 @@ class AreaCoverage:
 
         All of it where zones leave nothing.
         """
-        if self.to_cover.area == 0.0:
+        import shapely
+
+        whole_m2 = float(shapely.area(self.to_cover))
+        if whole_m2 == 0.0:
             return 1.0
         lines = [line for name, line in self.lines.items() if name in flown]
-        met = self.to_cover.intersection(covered(self.area, lines))
-        return min(1.0, met.area / self.to_cover.area)
+        met = shapely.intersection(self.to_cover, covered(self.area, lines))
+        return min(1.0, float(shapely.area(met)) / whole_m2)

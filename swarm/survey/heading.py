@@ -54,7 +54,8 @@ def axes(heading_deg: float) -> FloatArray:
     """(2, 2) from east and north to along and across lines; it is its own inverse."""
     heading_rad = np.radians(heading_deg)
     sine, cosine = np.sin(heading_rad), np.cos(heading_rad)
-    return np.array([[sine, cosine], [cosine, -sine]])
+    turned: FloatArray = np.array([[sine, cosine], [cosine, -sine]])
+    return turned
 
 
 def strips_across(low_m: float, high_m: float, apart_m: float) -> int:

@@ -86,21 +86,23 @@ def line_tasks(area: Area, zones: Sequence[Zone], margin_m: float) -> tuple[Task
 
 def lines_enu_m(area: Area, zones: Sequence[Zone], margin_m: float) -> FloatArray | Uncut:
     """(lines, 2, 2) both ends of every line, in the order of strips [m; east, north]."""
+    import shapely
+
     corners = len(area.polygon_enu_m) + sum(map(len, area.holes_enu_m))
     if corners > MOST_CORNERS:
         problem = f"has {corners} corners with its holes, and lines are made of {MOST_CORNERS}"
         return Uncut(problem, "simplify its outline", "polygon_m")
     polygons = to_cover(area, zones, margin_m)
-    if polygons.area < _SHORTEST_M**2:
-        problem = "zones with their margin leave nothing of it"
-        return Uncut(problem, "move it out of zones, or change these", "polygon_m")
+    whole_m2 = float(shapely.area(polygons))
+    if whole_m2 < _SHORTEST_M**2:
+        return _NOTHING_LEFT
     heading_deg = area.heading_deg
     if heading_deg is None:
         heading_deg = fewest_turns_deg(polygons, area.apart_m)
     longest_m = math.inf if area.max_line_m is None else area.max_line_m
     at_least = max(
         strips_across(*_extent_m(polygons, axes(heading_deg)), area.apart_m),
-        polygons.area / (area.apart_m * longest_m),
+        whole_m2 / (area.apart_m * longest_m),
     )
     if at_least > MOST_LINES:
         return _too_many(area, int(at_least))
@@ -108,7 +110,16 @@ def lines_enu_m(area: Area, zones: Sequence[Zone], margin_m: float) -> FloatArra
     main_m = _clipped_m(middles_m, zones, margin_m)
     rest_m = _lines_of_rest_m(polygons, main_m, area.apart_m, zones, margin_m)
     lines_m = _in_equal_parts(np.round(np.concatenate([main_m, rest_m]), 3), longest_m)
+    if not len(lines_m):  # crumbs between zones
+        return _NOTHING_LEFT
     return _too_many(area, len(lines_m)) if len(lines_m) > MOST_LINES else lines_m
+
+
+_NOTHING_LEFT = Uncut(
+    "zones with their margin leave nothing of it",
+    "move it out of zones, or change these",
+    "polygon_m",
+)
 
 
 def _too_many(area: Area, lines: int) -> Uncut:
@@ -206,15 +217,16 @@ def _lines_of_rest_m(
     import shapely
 
     more = np.empty((0, 2, 2))
+    enough_m2 = _LEFT_FRAC * float(shapely.area(polygons))
     rest = _uncovered(polygons, lines_m, apart_m)
     for _ in range(_ROUNDS):
         parts = shapely.get_parts(rest)
         areas_m2 = shapely.area(parts)
         order = np.argsort(-areas_m2, kind="stable")
         left_m2 = areas_m2.sum() - np.cumsum(areas_m2[order])
-        enough = int(np.searchsorted(-left_m2, -_LEFT_FRAC * polygons.area)) + 1
-        if areas_m2.sum() <= _LEFT_FRAC * polygons.area:
+        if areas_m2.sum() <= enough_m2:
             break
+        enough = int(np.searchsorted(-left_m2, -enough_m2)) + 1
         axes_m = np.array([_long_axis_m(part) for part in parts[order[:enough]]])
         new = _clipped_m(axes_m, zones, margin_m)
         if not len(new):

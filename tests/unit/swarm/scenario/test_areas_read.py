@@ -97,7 +97,8 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
         f'id = "{"s" * 57}"',
         [
             (
-                f'area[1] "{"s" * 47}…".id: \'{"s" * 46}… is too long; give an id of 1 to 64 letters, '
+                f'area[1] "{"s" * 47}…".id: \'{"s" * 46}… is too long; give an id of 1 to 64 '
+                "letters, "
                 "digits, '_', '-' or '.', beginning with a letter or digit, but 56 at most"
             )
         ],
