@@ -117,6 +117,7 @@ def plan(
     from json import dumps
 
     from coordinator.core.heights import height_warning
+    from coordinator.mission_view.area_report import areas_as_json
     from coordinator.planner.exact import ProblemTooLargeError
     from coordinator.planner.options import BOUND_S, after_time, first_of, whole_limit
     from coordinator.planner.plan import make_plan
@@ -157,7 +158,8 @@ def plan(
     if export is not None:
         _export(export, mission, result, firmware)
     if json:
-        print(dumps(plan_as_json(result), allow_nan=False))
+        told = plan_as_json(result) | areas_as_json(mission, result.completion_s)
+        print(dumps(told, allow_nan=False))
     else:
         from rich.console import Console
 

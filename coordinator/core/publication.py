@@ -21,7 +21,7 @@ from swarm.model.layers import FlightLayers
 from swarm.protocol.board import TaskBoard, TaskState, is_of_field
 from swarm.protocol.encoding import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES, encode
 from swarm.protocol.events import LogLine, Publish
-from swarm.protocol.field_messages import BaseSpec, ZoneSpec
+from swarm.protocol.field_messages import AreaSpec, BaseSpec, ZoneSpec
 from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.messages import (
     Body,
@@ -70,6 +70,7 @@ def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> Missi
         wind_enu_m_s=mission.wind_enu_m_s,
         zone_margin_m=mission.zone_margin_m,
         band_m=mission.band_m,
+        areas=tuple(map(AreaSpec.of, mission.areas)),
     )
 
 
@@ -86,7 +87,7 @@ def unsayable(mission: Mission, layers: FlightLayers) -> list[str]:
     size = _longest(mission.name, mission_config_of(mission, layers, MAX_COUNT))
     if size > LARGE_LIMIT_BYTES:
         found.append(
-            f"fleet, bases and zones take {size} bytes, and a message has room for "
+            f"fleet, bases, zones and areas take {size} bytes, and a message has room for "
             f"{LARGE_LIMIT_BYTES}"
         )
     for number, task in enumerate(mission.tasks):
@@ -145,7 +146,7 @@ def scenario_differences(mission: Mission, layers: FlightLayers, replica: Replic
     found = []
     brief = replica.brief
     if brief is not None and brief != mission_config_of(mission, layers, brief.run):
-        found.append("fleet, horizon, defaults, bases, zones or wind")
+        found.append("fleet, horizon, defaults, bases, zones, areas or wind")
     for number, task in enumerate(mission.tasks):
         entry = replica.posted.get(task.id)
         if entry is not None and replace(entry, withdrawn=False) != task_entry_of(task, number):

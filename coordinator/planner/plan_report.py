@@ -9,6 +9,7 @@ from typing import Any
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from coordinator.mission_view.area_report import areas_in_words
 from coordinator.planner.schedule_report import SCHEDULE_COLUMNS, around, flown, reasons
 from swarm.model import Mission, Plan, TaskId, Uav, UavId
 from swarm.model.plan import LeftOut, Schedule, ScheduleEntry
@@ -160,7 +161,11 @@ def _stops(mission: Mission, plan: Plan, uav: Uav) -> Text:
 
 
 def _worth(mission: Mission, plan: Plan, late: list[TaskId]) -> list[tuple[str, str | Text]]:
-    rows: list[tuple[str, str | Text]] = [("objective J", f"{plan.objective:.4f} value·s")]
+    rows: list[tuple[str, str | Text]] = [
+        (fact.name, Text(fact.text, style=_LATE if fact.bad else ""))
+        for fact in areas_in_words(mission, plan.completion_s)
+    ]
+    rows.append(("objective J", f"{plan.objective:.4f} value·s"))
     if plan.optimum is None:
         rows.append(("optimum", "not proven: the problem is too large for a quick proof"))
         if plan.bound is not None:

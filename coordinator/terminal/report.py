@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from coordinator.mission_view.area_report import areas_as_json, areas_in_words
 from coordinator.mission_view.missed import missed_tasks
 from coordinator.mission_view.presentation import BAD, Signs, signs_for, story_style
 from coordinator.mission_view.results import (
@@ -131,6 +132,7 @@ class MissionReport:
                 for uav, rates in result.rates.items()
             }
         planned = _no_plan(self.mission) if self.plan is None else plan_as_json(self.plan)
+        planned |= areas_as_json(self.mission, _planned_tasks(self.plan), result.done)
         found: dict[str, object] = _finite({**planned, **flown})
         return found
 
@@ -183,6 +185,7 @@ class MissionReport:
             text = f"{shown_value(self.value)} value·s: m·(D − t) of each success, failures nothing"
             found.append(ReportFact("by outcomes", text))
         found += self._of_field()
+        found += areas_in_words(self.mission, _planned_tasks(self.plan), self.result.done)
         spent = []
         if self.takeoff_s is not None:
             spent.append(f"take-off {shown_s(self.takeoff_s)} s")
@@ -290,6 +293,10 @@ def write_report(report: MissionReport, path: Path) -> None:
         problem = f"cannot be written: {error.strerror or error}"
         remedy = "name a file that can"
         raise InputError(Fault("--report", str(path), problem, remedy)) from error
+
+
+def _planned_tasks(plan: Plan | None) -> Collection[TaskId]:
+    return () if plan is None else plan.completion_s
 
 
 def _no_plan(mission: Mission) -> dict[str, object]:

@@ -134,6 +134,7 @@ def mission_with(
         wind_enu_m_s=brief.wind_enu_m_s,
         zone_margin_m=brief.zone_margin_m,
         band_m=brief.band_m,
+        areas=tuple(area.area() for area in brief.areas),
     )
 
 

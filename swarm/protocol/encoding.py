@@ -15,7 +15,14 @@ from typing import Any, Final
 
 import msgpack
 
-from swarm.protocol.field_messages import BaseSpec, UavReady, ZoneEdit, ZoneSpec
+from swarm.protocol.field_messages import (
+    AreaSpec,
+    BaseSpec,
+    CameraSpec,
+    UavReady,
+    ZoneEdit,
+    ZoneSpec,
+)
 from swarm.protocol.messages import (
     FIELD_VERSION,
     SCHEMA_VERSION,
@@ -65,7 +72,16 @@ KINDS: Final[dict[str, type[Body]]] = {
 NAMES: Final[dict[type[Body], str]] = {kind: name for name, kind in KINDS.items()}
 FIELDS: Final[dict[type, tuple[str, ...]]] = {
     part: tuple(field.name for field in dataclasses.fields(part))
-    for part in (*KINDS.values(), UavSpec, BaseSpec, ZoneSpec, ChoiceBasis, Candidate)
+    for part in (
+        *KINDS.values(),
+        UavSpec,
+        BaseSpec,
+        ZoneSpec,
+        AreaSpec,
+        CameraSpec,
+        ChoiceBasis,
+        Candidate,
+    )
 }
 """Of everything that a message is made of."""
 _OF_TASKS: Final = frozenset(
@@ -73,7 +89,7 @@ _OF_TASKS: Final = frozenset(
 )
 _OF_CLAIMS: Final = ("base", "stage", "arrives_s", "sortie_end_s", "reversed", "departs_s")
 _OF_UAVS: Final = ("airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
-_OF_BRIEFS: Final = ("bases", "zones", "wind_enu_m_s", "zone_margin_m", "band_m")
+_OF_BRIEFS: Final = ("bases", "zones", "wind_enu_m_s", "zone_margin_m", "band_m", "areas")
 SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
     UavSpec: frozenset({"acceleration_m_s2", *_OF_UAVS}),
     MissionConfig: frozenset(_OF_BRIEFS),

@@ -1,4 +1,4 @@
-"""What the field adds to what is said: bases and zones, and the operator's word about them.
+"""What the field adds to what is said: bases, zones and areas, and the operator's word about them.
 
 Zones of the brief are what a mission begins with. The operator's word about one counts before the
 brief's, for the flight of the mission that it names; see swarm.protocol.operator_commands.
@@ -6,13 +6,13 @@ brief's, for the flight of the mission that it names; see swarm.protocol.operato
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Annotated
 
-from annotated_types import Ge, Le, Len
+from annotated_types import Ge, Gt, Le, Len
 from pydantic import Strict
 
-from swarm.model import Base, BaseId, Zone, ZoneId
+from swarm.model import Area, AreaId, Base, BaseId, Camera, Zone, ZoneId
 from swarm.protocol.fields import (
     MAX_COUNT,
     Checked,
@@ -21,12 +21,18 @@ from swarm.protocol.fields import (
     Flag,
     FlatPoint,
     Id,
+    Instant,
     Metres,
     Point,
+    Probability,
+    Value,
     Words,
 )
 
 Slots = Annotated[int, Strict(), Ge(1), Le(MAX_COUNT)]
+Millimetres = Annotated[float, Strict(), Gt(0.0), Le(1e5)]
+Pixels = Annotated[int, Strict(), Ge(1), Le(MAX_COUNT)]
+Spacing = Annotated[float, Strict(), Ge(1e-3), Le(1e8)]
 Ring = Annotated[tuple[FlatPoint, ...], Len(3)]
 """Corners [m; east, north of the mission origin]."""
 
@@ -97,6 +103,70 @@ class ZoneSpec(Checked):
             zone.ceiling_m,
             zone.inclusive,
         )
+
+
+@dataclass(frozen=True, slots=True)
+class CameraSpec(Checked):
+    """The camera of an area, as missions have it."""
+
+    sensor_width_mm: Millimetres
+    sensor_height_mm: Millimetres
+    focal_length_mm: Millimetres
+    image_width_px: Pixels
+    image_height_px: Pixels
+    landscape: Flag
+    exposure_s: Annotated[float, Strict(), Gt(0.0), Le(1e3)]
+
+
+@dataclass(frozen=True, slots=True)
+class AreaSpec(Checked):
+    """One area as the brief describes it, for those who look on: its lines are tasks of the board.
+
+    Raises:
+        ValueError: it is no area that a mission could have.
+    """
+
+    id: Id
+    polygon_enu_m: Ring
+    value: Value
+    holes_enu_m: tuple[Ring, ...]
+    spacing_m: Spacing | None
+    """Between lines [m]; None: by the camera."""
+    trigger_m: Spacing | None
+    camera: CameraSpec | None
+    height_m: Metres | None
+    """Of its lines [m above the mission origin]; None: in the UAV's layer."""
+    sidelap_frac: Probability | None
+    frontlap_frac: Probability | None
+    heading_deg: Annotated[float, Strict(), Ge(-1e4), Le(1e4)] | None
+    max_line_m: Spacing | None
+    kind: Id | None
+    service_s: Duration
+    due_s: Instant | None
+    opens_s: Instant
+    closes_s: Instant | None
+    appears_s: Instant
+    lines: Annotated[int, Strict(), Ge(0), Le(100_000)]
+    """How many it was cut into; their ids follow from its own."""
+
+    def __post_init__(self) -> None:
+        self.area()
+
+    def area(self) -> Area:
+        """As missions have it."""
+        told = {name: getattr(self, name) for name in _OF_AREAS}
+        camera = None if self.camera is None else Camera(**asdict(self.camera))
+        return Area(id=AreaId(self.id), camera=camera, **told)
+
+    @classmethod
+    def of(cls, area: Area) -> AreaSpec:
+        """``area`` as a brief describes it."""
+        camera = None if area.camera is None else CameraSpec(**asdict(area.camera))
+        return cls(id=area.id, camera=camera, **{name: getattr(area, name) for name in _OF_AREAS})
+
+
+_OF_AREAS = tuple(name for name in AreaSpec.__dataclass_fields__ if name not in ("id", "camera"))
+"""What is said of an area as it is."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -18,7 +18,7 @@ from pydantic import Strict
 
 from swarm.model import Origin
 from swarm.model.ids import AUTHORITY, FLEET, RESERVED
-from swarm.protocol.field_messages import BaseSpec, UavReady, ZoneEdit, ZoneSpec
+from swarm.protocol.field_messages import AreaSpec, BaseSpec, UavReady, ZoneEdit, ZoneSpec
 from swarm.protocol.fields import (
     MAX_COUNT,
     Acceleration,
@@ -113,13 +113,15 @@ class MissionConfig(Checked):
     """Paths stay that far away from zones [m]."""
     band_m: tuple[Height, Height] | None = None
     """Heights above the ground that may be used [m]; None: each UAV in its own layer."""
+    areas: tuple[AreaSpec, ...] = ()
+    """What some of the tasks cover together."""
 
     def __post_init__(self) -> None:
         Origin(*self.origin)
         ids = {uav.id for uav in self.uavs}
         if len(ids) != len(self.uavs) or not ids.isdisjoint(RESERVED):
             raise ValueError(f"UAV ids must differ, from each other and from {', '.join(RESERVED)}")
-        for what, named in (("base", self.bases), ("zone", self.zones)):
+        for what, named in (("base", self.bases), ("zone", self.zones), ("area", self.areas)):
             if len({spec.id for spec in named}) != len(named):
                 raise ValueError(f"{what} ids must differ from each other")
         wind_m_s = math.hypot(*self.wind_enu_m_s)

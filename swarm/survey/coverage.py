@@ -55,6 +55,13 @@ class AreaCoverage:
         self.to_cover = to_cover(area, zones, margin_m)
         """What is to be covered [m; east, north]."""
 
+    @property
+    def to_cover_m2(self) -> float:
+        """How large that is [m²]."""
+        import shapely
+
+        return float(shapely.area(self.to_cover))
+
     def share(self, flown: Collection[TaskId]) -> float:
         """How much of what is to be covered those of the ``flown`` tasks cover; within 0..1.
 
@@ -62,7 +69,7 @@ class AreaCoverage:
         """
         import shapely
 
-        whole_m2 = float(shapely.area(self.to_cover))
+        whole_m2 = self.to_cover_m2
         if whole_m2 == 0.0:
             return 1.0
         lines = [line for name, line in self.lines.items() if name in flown]

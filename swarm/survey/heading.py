@@ -94,7 +94,8 @@ def _directions_deg(edges_m: FloatArray) -> FloatArray:
     longest = np.argsort(-np.hypot(east_m, north_m), kind="stable")
     heading_deg = np.degrees(np.arctan2(east_m, north_m))[longest] % 180.0
     _, first = np.unique(np.round(heading_deg, 6), return_index=True)
-    return heading_deg[np.sort(first)][:_MOST_DIRECTIONS]
+    distinct_deg: FloatArray = heading_deg[np.sort(first)]
+    return distinct_deg[:_MOST_DIRECTIONS]
 
 
 def _lines(edges_m: FloatArray, heading_deg: float, apart_m: float) -> tuple[float, float]:

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from hypothesis import strategies as st
 
+from swarm.model import Area, AreaId, Camera
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
-from swarm.protocol.field_messages import BaseSpec, UavReady, ZoneEdit, ZoneSpec
+from swarm.protocol.field_messages import AreaSpec, BaseSpec, UavReady, ZoneEdit, ZoneSpec
 from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.messages import (
     CommandKind,
@@ -86,6 +89,43 @@ zones = st.builds(
     st.none() | st.floats(1.0, 1e6),
     st.booleans(),
 )
+cameras = st.builds(
+    Camera,
+    st.floats(1.0, 50.0),
+    st.floats(1.0, 50.0),
+    st.floats(1.0, 200.0),
+    st.integers(1, 20_000),
+    st.integers(1, 20_000),
+    st.booleans(),
+    st.floats(1e-6, 1.0),
+)
+spacings = st.fixed_dictionaries(
+    {"spacing_m": st.floats(0.1, 1e3), "trigger_m": st.none() | st.floats(0.1, 1e3)}
+) | st.fixed_dictionaries(
+    {
+        "camera": cameras,
+        "height_m": st.floats(1.0, 500.0),
+        "sidelap_frac": st.floats(0.0, 0.9),
+        "frontlap_frac": st.floats(0.0, 0.9),
+    }
+)
+
+
+def _area(
+    name: str, rings: Any, spacing: dict[str, Any], lines: int, due_s: float | None
+) -> AreaSpec:
+    area = Area(AreaId(name), rings[0], 3.0, rings[1], lines=lines, due_s=due_s, **spacing)
+    return AreaSpec.of(area)
+
+
+areas = st.builds(
+    _area,
+    ids,
+    rings.map(lambda ring: (ring, ())) | holed,
+    spacings,
+    st.integers(0, 200),
+    st.none() | st.floats(0.0, 1e6),
+)
 origins = st.tuples(st.floats(-89, 89), st.floats(-180, 180), numbers)
 briefs = st.builds(
     MissionConfig,
@@ -101,6 +141,7 @@ briefs = st.builds(
     st.tuples(st.floats(-30.0, 30.0), st.floats(-30.0, 30.0)),
     not_negatives,
     st.none() | st.tuples(st.floats(0.0, 50.0), st.floats(51.0, 200.0)),
+    st.lists(areas, max_size=2, unique_by=lambda area: area.id).map(tuple),
 )
 epochs = st.builds(
     PlanEpoch,

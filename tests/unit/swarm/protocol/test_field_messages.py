@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from swarm.model import Base, BaseId, Zone, ZoneId
+from swarm.model import Area, AreaId, Base, BaseId, Camera, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import FIELD_DEFAULTS, FIELDS, KINDS, SINCE_FIELD, encode
-from swarm.protocol.field_messages import BaseSpec, UavReady, ZoneEdit, ZoneSpec
+from swarm.protocol.field_messages import AreaSpec, BaseSpec, UavReady, ZoneEdit, ZoneSpec
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import FIELD_VERSION, SCHEMA_VERSION, Body, UavSpec
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
@@ -34,6 +34,20 @@ from tests.support.spoilt_messages import Parts, drop_reason, parts_of, reason_w
 
 SQUARE = ((0.0, 0.0), (9.0, 0.0), (9.0, 9.0), (0.0, 9.0))
 VILLAGE = ZoneSpec("village", SQUARE, (), None, 120.0, False)
+FIELD_A = AreaSpec.of(
+    Area(
+        AreaId("a"),
+        SQUARE,
+        5.0,
+        camera=Camera(13.2, 8.8, 8.8, 5472, 3648),
+        height_m=20.0,
+        sidelap_frac=0.7,
+        frontlap_frac=0.8,
+        max_line_m=100.0,
+        due_s=90.0,
+        lines=3,
+    )
+)
 B0 = BaseSpec("b0", (1.0, 2.0, 0.0), 120.0, 2)
 PLAIN: list[tuple[str, Body]] = [
     (COORDINATOR, brief(uav("u0", t0=0.5))),
@@ -45,6 +59,7 @@ PLAIN: list[tuple[str, Body]] = [
 FIELD: dict[str, tuple[str, Body]] = {
     "bases": (COORDINATOR, replace(brief(), bases=(B0,))),
     "zones": (COORDINATOR, replace(brief(), zones=(VILLAGE,))),
+    "areas": (COORDINATOR, replace(brief(), areas=(FIELD_A,))),
     "wind": (COORDINATOR, replace(brief(), wind_enu_m_s=(3.0, -1.0))),
     "margin": (COORDINATOR, replace(brief(), zone_margin_m=5.0)),
     "band": (COORDINATOR, replace(brief(), band_m=(30.0, 110.0))),
@@ -106,6 +121,17 @@ def test_every_default_of_the_wire_is_that_of_the_body() -> None:
         (
             "zones",
             lambda fields: fields["zones"][0].update(polygon_enu_m=[[0, 0], [1e9, 0], [1, 1]]),
+        ),
+        ("areas", lambda fields: fields["areas"].append(fields["areas"][0])),
+        ("areas", lambda fields: fields["areas"][0].update(spacing_m=10.0)),
+        ("areas", lambda fields: fields["areas"][0].update(height_m=-1.0)),
+        ("areas", lambda fields: fields["areas"][0].update(lines=10**9)),
+        ("areas", lambda fields: fields["areas"][0]["camera"].update(focal_length_mm=0.0)),
+        (
+            "areas",
+            lambda fields: fields["areas"][0].update(
+                polygon_enu_m=[[0, 0], [9, 9], [9, 0], [1, 9]]
+            ),
         ),
         ("wind", lambda fields: fields.update(wind_enu_m_s=[1e7, 0.0])),
         ("wind", lambda fields: fields.update(wind_enu_m_s=[3.0])),
@@ -194,10 +220,13 @@ def test_only_the_operator_draws_zones_and_lets_uavs_start(body: Body, key: str)
         assert drop_reason(key, encode(replace(said, writer=other))) == "said on another's key"
 
 
-def test_zones_and_bases_are_said_as_missions_have_them() -> None:
+def test_zones_areas_and_bases_are_said_as_missions_have_them() -> None:
     holes = (((1.0, 1.0), (2.0, 1.0), (2.0, 2.0)),)
     zone = Zone(ZoneId("z"), SQUARE, holes, floor_m=5.0, ceiling_m=80.0, inclusive=True)
     base = Base(BaseId("b"), (1.0, 2.0, 3.0), swap_s=9.0, slots=None)
 
     assert ZoneSpec.of(zone).zone() == zone
     assert BaseSpec.of(base).base() == base
+    area = Area(AreaId("a"), SQUARE, 5.0, holes, spacing_m=3.0, trigger_m=2.0, kind="hay", lines=2)
+    assert AreaSpec.of(area).area() == area
+    assert AreaSpec.of(FIELD_A.area()) == FIELD_A
