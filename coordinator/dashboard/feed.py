@@ -423,6 +423,10 @@ def _mission_text(name: str, brief: MissionConfig) -> str:
                 }
                 for base in brief.bases
             ],
+            "areas": [
+                {"id": area.id, "rings": [area.polygon_enu_m, *area.holes_enu_m]}
+                for area in brief.areas
+            ],
             "zone_margin_m": brief.zone_margin_m,
             "uavs": uavs,
         },

@@ -9,6 +9,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from coordinator.plot.areas import (
+    area_labels,
+    area_legend,
+    area_places_m,
+    draw_areas,
+    lines_of_areas,
+)
 from coordinator.plot.field import (
     draw_bases,
     draw_lines,
@@ -72,6 +79,7 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     else:
         for uav, entries in plan.schedule.items():
             draw_schedule(axes, mission, entries, looks[uav])
+    draw_areas(axes, mission, plan)
     _draw_tasks(axes, mission, plan, looks, diameters)
     draw_bases(axes, mission)
     _draw_starts(axes, mission, looks)
@@ -104,7 +112,7 @@ def _places_m(mission: Mission) -> list[tuple[float, float]]:
     """East and north [m] of all that has a place."""
     starts = [uav.position_enu_m[:2] for uav in mission.uavs]
     tasks = [task.position_enu_m[:2] for task in mission.tasks]
-    return [*starts, *tasks, *field_places_m(mission)] or [(0.0, 0.0)]
+    return [*starts, *tasks, *field_places_m(mission), *area_places_m(mission)] or [(0.0, 0.0)]
 
 
 def _diameters_points(mission: Mission) -> dict[TaskId, float]:
@@ -167,7 +175,10 @@ def _draw_tasks(
 ) -> None:
     owner = {task: uav for uav, route in plan.routes.items() for task in route}
     draw_lines(axes, mission, owner, looks)
+    of_areas = lines_of_areas(mission)
     for task in mission.tasks:
+        if task.id in of_areas:
+            continue
         planned = task.id in owner
         bad = _is_late(mission, plan, task) if planned else task.id in plan.left_out
         axes.plot(
@@ -244,7 +255,8 @@ def _draw_legend(
             )
         )
     handles.append(marker("^", SHARED, "white", "start"))
-    handles.append(marker("o", "#777777", "white", "task; its area shows its value"))
+    if len(lines_of_areas(mission)) < len(mission.tasks):
+        handles.append(marker("o", "#777777", "white", "task; its area shows its value"))
     if any(_is_late(mission, plan, t) for t in mission.tasks if t.id in plan.completion_s):
         handles.append(marker("o", "#777777", LATE, "completed after the horizon"))
     if any(
@@ -252,6 +264,7 @@ def _draw_legend(
     ):
         handles.append(marker("X", "white", UNPLANNED, "in no list (appears later)"))
     handles += field_legend(mission, plan)
+    handles += area_legend(mission)
     title = f"J = {plan.objective:.4f}"
     if plan.optimum is not None:
         gap = "" if plan.gap is None else f", gap {100.0 * plan.gap:.2f} %"
@@ -277,11 +290,13 @@ def _stops(plan: Plan, uav: UavId) -> Sequence[str]:
 
 def _draw_labels(axes: Axes, mission: Mission, diameters: Mapping[TaskId, float]) -> None:
     """Name every place where its name hides nothing, as far as there is room."""
+    of_areas = lines_of_areas(mission)
     labels = [
         Label(*task_label(mission, task), 0.5 * diameters[task.id], bold=False)
         for task in mission.tasks
+        if task.id not in of_areas
     ]
-    labels += field_labels(mission)
+    labels += [*area_labels(mission), *field_labels(mission)]
     for uavs in _start_groups(mission):
         name = ", ".join(uav.id for uav in uavs) if len(uavs) <= 3 else f"{len(uavs)} UAVs"
         labels.insert(0, Label(name, _middle_m(uavs), 6.0, bold=True))

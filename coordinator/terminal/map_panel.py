@@ -17,6 +17,7 @@ from rich.text import Text
 from coordinator.mission_view.presentation import BAD, Signs, uav_colour
 from coordinator.mission_view.scene import Scene, TaskView
 from coordinator.mission_view.uav_state import UavView
+from swarm.model.rings import Ring
 from swarm.protocol.board import TaskState
 
 if TYPE_CHECKING:
@@ -128,6 +129,8 @@ _ROOM_PER_LETTER = 6
 
 _ZONE = "red"
 """Style of the borders of zones."""
+_AREA = "dim green"
+"""Style of the borders of areas to cover."""
 Point = tuple[float, float, float]
 
 
@@ -146,6 +149,7 @@ def map_panel(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]
     canvas = Canvas(columns, rows, braille=signs.braille)
     view = _View(scene, columns, rows)
     room = columns * rows / max(1, len(scene.tasks))
+    _draw_areas(canvas, view, scene)
     _draw_zones(canvas, view, scene)
     _draw_paths(canvas, view, scene, room)
     for base in scene.mission.bases:
@@ -215,12 +219,22 @@ def _extent_m(scene: Scene) -> tuple[float, float]:
     return max(east_m) - min(east_m), max(north_m) - min(north_m)
 
 
+def _draw_areas(canvas: Canvas, view: _View, scene: Scene) -> None:
+    for area in scene.mission.areas:
+        for ring in (area.polygon_enu_m, *area.holes_enu_m):
+            _draw_ring(canvas, view, ring, _AREA)
+
+
 def _draw_zones(canvas: Canvas, view: _View, scene: Scene) -> None:
-    """Borders of zones; what of them lies outside the map is left out."""
     for zone in scene.mission.zones:
         for ring in (zone.polygon_enu_m, *zone.holes_enu_m):
-            for first, last in pairwise((*ring, ring[0])):
-                canvas.line(view.beyond(first), view.beyond(last), _ZONE)
+            _draw_ring(canvas, view, ring, _ZONE)
+
+
+def _draw_ring(canvas: Canvas, view: _View, ring: Ring, style: str) -> None:
+    """A border; what of it lies outside the map is left out."""
+    for first, last in pairwise((*ring, ring[0])):
+        canvas.line(view.beyond(first), view.beyond(last), style)
 
 
 def _draw_paths(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:

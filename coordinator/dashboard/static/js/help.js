@@ -73,7 +73,7 @@ export function showHelp() {
       make(
         "p",
         { class: "fine" },
-        "Solid lines were flown, dashed ones are planned; the straight line from a UAV leads to its task. Hatched areas are zones where nobody may fly; squares are bases where batteries are changed.",
+        "Solid lines were flown, dashed ones are planned; the straight line from a UAV leads to its task. Shaded areas are to be covered by lines, which are broad once they are flown. Hatched ones are zones where nobody may fly; squares are bases where batteries are changed.",
       ),
       make("menu", {}, make("button", { class: "primary", autofocus: true }, "Close")),
     ),

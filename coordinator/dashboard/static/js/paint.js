@@ -34,6 +34,7 @@ export function taskRadius(value, look) {
 export function paintGround(canvas, view, picture, motion, look, spots) {
   canvas.clearRect(0, 0, view.width, view.height);
   if (look.grid) paintGrid(canvas, view, look);
+  for (const area of picture.mission?.areas ?? []) paintArea(canvas, view, area, look);
   for (const zone of picture.zonesInForce) paintZone(canvas, view, zone, look);
   paintLines(canvas, view, picture, look);
   paintLists(canvas, view, picture, motion, look);
@@ -43,15 +44,31 @@ export function paintGround(canvas, view, picture, motion, look, spots) {
   paintOutline(canvas, view, look);
 }
 
+/** An area to be covered: shaded, with its border and its holes. */
+function paintArea(canvas, view, { id, rings }, look) {
+  const { ink } = look;
+  canvas.beginPath();
+  for (const ring of rings) trace(canvas, view, ring);
+  canvas.fillStyle = canvas.strokeStyle = ink.accent;
+  canvas.lineWidth = 1;
+  canvas.globalAlpha = 0.08;
+  canvas.fill("evenodd");
+  canvas.globalAlpha = 0.7;
+  canvas.stroke();
+  canvas.globalAlpha = 1;
+  canvas.font = `italic 11px ${ink.font}`;
+  canvas.textAlign = "center";
+  const spots = rings[0].map((corner) => view.spot(corner));
+  const top = spots.reduce((best, spot) => (spot[1] < best[1] ? spot : best));
+  label(canvas, id, top[0], top[1] - 5, ink.accent, look);
+}
+
 /** A zone: hatched inside where nobody may fly; of one to keep inside, only the border. */
 function paintZone(canvas, view, zone, look) {
   const { ink } = look;
   canvas.save();
   canvas.beginPath();
-  for (const ring of [zone.polygon, ...zone.holes]) {
-    ring.forEach((corner, index) => canvas[index ? "lineTo" : "moveTo"](...view.spot(corner)));
-    canvas.closePath();
-  }
+  for (const ring of [zone.polygon, ...zone.holes]) trace(canvas, view, ring);
   canvas.strokeStyle = ink.trouble;
   canvas.lineWidth = 1.5;
   canvas.setLineDash(zone.inclusive ? [10, 5] : []);
@@ -66,6 +83,12 @@ function paintZone(canvas, view, zone, look) {
   const spots = zone.polygon.map((corner) => view.spot(corner));
   const [x, y] = [0, 1].map((axis) => spots.reduce((sum, spot) => sum + spot[axis], 0) / spots.length);
   label(canvas, zone.id, x, y + 4, ink.trouble, look);
+}
+
+/** One more closed ring of what is to be filled or drawn. */
+function trace(canvas, view, corners) {
+  corners.forEach((corner, index) => canvas[index ? "lineTo" : "moveTo"](...view.spot(corner)));
+  canvas.closePath();
 }
 
 /** Slanting lines over what of those spots is in view; whoever calls has clipped. */
@@ -86,12 +109,16 @@ function hatch(canvas, spots, view) {
   canvas.globalAlpha = 1;
 }
 
-/** Tasks that are lines. */
+/** Tasks that are lines, those that were flown in the colour of who has. */
 function paintLines(canvas, view, picture, look) {
-  canvas.strokeStyle = look.ink.muted;
-  canvas.lineWidth = 2;
-  for (const task of picture.tasks.values())
-    if (task.path?.length && task.state !== "withdrawn") path(canvas, view, task.path);
+  for (const task of picture.tasks.values()) {
+    if (!task.path?.length || task.state === "withdrawn") continue;
+    const flown = task.state === "done" && task.uav;
+    const { ink } = look;
+    canvas.strokeStyle = flown ? uavColour(picture.described(task.uav).number, ink.dark) : ink.muted;
+    canvas.lineWidth = flown ? 4 : 2;
+    path(canvas, view, task.path);
+  }
 }
 
 function paintBase(canvas, view, base, look) {
