@@ -38,10 +38,16 @@ def areas_in_words(
         share = facts.coverage_planned if flown is None else facts.coverage_flown
         unknown = flown is None and area.appears_s > 0.0
         bad = not unknown and (share or 0.0) < ENOUGH_FRAC
-        text = f"{_coverage_in_words(facts)}; {_lines_in_words(facts)}"
-        yield ReportFact(f"area {facts.area}", text, bad=bad)
-        if words := _pictures_in_words(facts):
-            yield ReportFact("", words)
+        lines, *more = facts_in_words(facts)
+        yield ReportFact(f"area {facts.area}", lines, bad=bad)
+        yield from (ReportFact("", words) for words in more)
+
+
+def facts_in_words(facts: AreaFacts) -> list[str]:
+    """One about lines and what they cover, and one about pictures where there are any."""
+    lines = f"{_coverage_in_words(facts)}; {_lines_in_words(facts)}"
+    pictures = _pictures_in_words(facts)
+    return [lines, pictures] if pictures else [lines]
 
 
 def _lines_in_words(facts: AreaFacts) -> str:

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from coordinator.mission_view.area_report import facts_in_words
 from coordinator.planner.schedule_report import around
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 from swarm.allocation.field import FieldProblem, FieldState
@@ -20,11 +21,14 @@ from swarm.kernels.field_alone import earliest_alone
 from swarm.model import Mission, Uav
 from swarm.model.layers import FlightLayers
 from swarm.model.mission import PLAIN_CONSTRAINTS
+from swarm.survey.facts import area_facts
 
 _TAKEOFF_S = 60.0
 """In the air before mission time 0, which no plan counts: the climb, and the wait for the others
 (`swarm coordinator --hover-s`)."""
 _MOST_NAMED = 6
+_MOST_BLUR_PX = 1.5
+"""Of a picture; more is seen in what is made of it."""
 
 
 def check_field(mission: Mission) -> list[CheckFinding]:
@@ -42,6 +46,7 @@ def check_field(mission: Mission) -> list[CheckFinding]:
         *_bases(mission, problem),
         *_zones(mission, problem),
         *_tasks(mission, problem),
+        *_areas(mission),
     ]
 
 
@@ -70,6 +75,20 @@ def _energy(mission: Mission) -> Iterator[CheckFinding]:
 def _usable_s(uav: Uav, charge_frac: float) -> float:
     """Time in the air without the reserve [s]."""
     return 0.0 if uav.endurance_s is None else (charge_frac - uav.reserve_frac) * uav.endurance_s
+
+
+def _areas(mission: Mission) -> Iterator[CheckFinding]:
+    """What lines of areas cover if all are flown, and what their pictures are worth."""
+    for area, facts in zip(
+        mission.areas, area_facts(mission, [task.id for task in mission.tasks]), strict=True
+    ):
+        text = "; ".join(facts_in_words(facts))
+        yield fine("areas", f"{area.id} {text}")
+        if facts.blur_px is not None and facts.blur_px > _MOST_BLUR_PX:
+            remedy = "fly slower or higher, or give the camera's exposure_s if it is shorter"
+            yield warns(
+                "areas", f"{area.id}: pictures are blurred by {facts.blur_px:.1f} px", remedy
+            )
 
 
 def _bases(mission: Mission, problem: FieldProblem) -> Iterator[CheckFinding]:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure
 
 from coordinator.planner.options import after_evaluations
@@ -13,7 +14,7 @@ from coordinator.planner.plan import make_plan
 from coordinator.plot import draw_plan, plan_figure
 from coordinator.plot.field import flown_m
 from coordinator.plot.labels import Label, place_labels
-from coordinator.plot.looks import path_styles
+from coordinator.plot.looks import LATE, path_styles
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId, Zone, ZoneId
 from swarm.model.plan import LeftOut, ScheduleEntry
 from swarm.runtime.clock import SystemClock
@@ -171,3 +172,34 @@ def test_inclusive_zones_are_shaded_outside() -> None:
 
     (patch,) = figure.axes[0].patches
     assert len(patch.get_path().to_polygons()) == 2  # around the map, and the hole where to fly
+
+
+def test_an_area_is_shown_whole_and_what_no_list_covers_stands_out() -> None:
+    mission = load_scenario(resolve_scenario("hayfield"))
+    plan = plan_of(mission)
+    some = {task: time_s for task, time_s in plan.completion_s.items() if task > "hay-060"}
+
+    whole, part = (
+        plan_figure(mission, replace(plan, completion_s=c)) for c in (plan.completion_s, some)
+    )
+
+    found = texts(whole)
+    assert {"hay", "farm", "paddock", "barn", "area; light: covered by these lists"} <= set(found)
+    assert not any(text.startswith("hay-") for text in found[: len(whole.axes[0].texts)])
+    light, dark = ("#DCEDC8", LATE)
+    assert shaded_m2(whole, dark) < 0.005 * shaded_m2(whole, light)
+    assert shaded_m2(part, dark) > 0.3 * shaded_m2(whole, light)
+
+
+def shaded_m2(figure: Figure, colour: str) -> float:
+    """Of patches of that colour, holes counted as well."""
+    patches = (
+        each for each in figure.axes[0].patches if to_hex(each.get_facecolor()) == to_hex(colour)
+    )
+    rings = (ring for patch in patches for ring in patch.get_path().to_polygons())
+    return abs(sum(signed_m2(np.array(ring)) for ring in rings))
+
+
+def signed_m2(ring: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> float:
+    east_m, north_m = ring.T
+    return 0.5 * float(np.dot(east_m, np.roll(north_m, -1)) - np.dot(north_m, np.roll(east_m, -1)))

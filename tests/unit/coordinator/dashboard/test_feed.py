@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from coordinator.dashboard.feed import Feed, PageSettings
+from swarm.model import Area, AreaId
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import MessageReceived
+from swarm.protocol.field_messages import AreaSpec
 from swarm.protocol.messages import Message, MissionPhase, Stamp
 from swarm.protocol.uav_messages import AttemptResult, Candidate, Choice, ChoiceBasis, StatusPhase
-from tests.support.builders import MISSION, OUT, epoch
+from tests.support.builders import MISSION, OUT, brief, epoch, uav
 from tests.support.desk_play import DeskPlay, FakePlayer
 
 KEYS = {"uavs": "id", "tasks": "id", "lists": "uav", "zones": "id", "commands": "n"}
@@ -124,6 +127,20 @@ def test_a_task_that_the_plan_leaves_out_is_told_with_the_reason_until_somebody_
     row = picture["tasks"]["t3"]
     assert (row["taken"], row["left_out"], row["why"]) == (True, None, None)
     assert (picture["counts"]["taken"], picture["counts"]["left_out"]) == (1, 0)
+
+
+def test_areas_come_with_the_mission_as_outlines() -> None:
+    ring, hole = ((0.0, 0.0), (9.0, 0.0), (9.0, 9.0)), ((4.0, 1.0), (8.0, 1.0), (8.0, 5.0))
+    area = Area(AreaId("field"), ring, 1.0, (hole,), spacing_m=2.0, lines=5)
+    play = DeskPlay()
+    play.begin()
+    play.say(COORDINATOR, replace(brief(uav("u1"), uav("u2")), areas=(AreaSpec.of(area),)))
+    feed = feed_of(play)
+    feed.look()
+
+    told = json.loads(feed.mission or "")["areas"]
+
+    assert told == [{"id": "field", "rings": [list(map(list, each)) for each in (ring, hole)]}]
 
 
 def test_what_has_not_changed_is_not_told_again() -> None:

@@ -14,7 +14,7 @@ from coordinator.mission_view.scene import scene_of
 from coordinator.mission_view.ways import still_ahead
 from coordinator.terminal.live_view import live_picture
 from coordinator.terminal.status_table import status_as_json, status_table
-from swarm.model import Base, BaseId, Mission, TaskId, Zone, ZoneId
+from swarm.model import Area, AreaId, Base, BaseId, Mission, TaskId, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.model.plan import LeftOut, Plan
 from swarm.protocol.field_messages import ZoneEdit, ZoneSpec
@@ -70,6 +70,22 @@ def test_zones_and_bases_are_on_the_map_and_in_the_status(teller: Teller) -> Non
     assert any("⢸" in line or "⡇" in line for line in text.splitlines())  # the pond's border
     assert "bases        barn (1 slot)" in text
     assert "zones        pond" in text
+
+
+def test_borders_of_areas_are_on_the_map() -> None:
+    corners = ((5.0, 5.0), (35.0, 5.0), (35.0, 75.0), (5.0, 75.0))
+    flown = replace(pasture(), zones=())
+    covered = replace(flown, areas=(Area(AreaId("field"), corners, 1.0, spacing_m=10.0),))
+
+    drawn = [dots(picture(Teller(each).mission_state)) for each in (flown, covered)]
+
+    assert drawn[0] == 0
+    assert drawn[1] > 50
+
+
+def dots(text: str) -> int:
+    """Cells of the map that lines go through."""
+    return sum("\u2800" < sign <= "\u28ff" for sign in text)
 
 
 def test_ways_lead_round_zones_by_bases_and_home(teller: Teller) -> None:

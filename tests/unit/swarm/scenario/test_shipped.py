@@ -21,7 +21,7 @@ from swarm.scenario.files import resolve_scenario, shipped_scenarios
 
 PLAIN = ["meadow", "orchard", "table-1", "valley-popups", "valley-survey"]
 """Those of schema 1."""
-NAMES = sorted([*PLAIN, "reservoir-inspection", "vineyard"])
+NAMES = sorted([*PLAIN, "hayfield", "reservoir-inspection", "vineyard"])
 
 
 def shipped(name: str) -> Mission:
@@ -55,9 +55,18 @@ def test_existing_file_wins_over_a_shipped_name(
             "valley-survey.toml",
             "valley-survey.toml: no such scenario file; did you mean 'valley-survey'? Shipped",
         ),
-        ("", "SCENARIO: no such scenario file; give a file or a shipped scenario: meadow, "),
-        ("a\nb", r"'a\nb': no such scenario file; give a file or a shipped scenario: meadow, "),
-        ("\0", r"'\x00': no such scenario file; give a file or a shipped scenario: meadow, "),
+        (
+            "",
+            "SCENARIO: no such scenario file; give a file or a shipped scenario: hayfield, ",
+        ),
+        (
+            "a\nb",
+            r"'a\nb': no such scenario file; give a file or a shipped scenario: hayfield, ",
+        ),
+        (
+            "\0",
+            r"'\x00': no such scenario file; give a file or a shipped scenario: hayfield, ",
+        ),
         ("x" * 5000, "x" * 5000 + ": no such scenario file; give a file or a shipped scenario: "),
     ],
 )

@@ -7,6 +7,8 @@ from dataclasses import replace
 from sim.fleet.doctor.field import check_field
 from sim.fleet.doctor.finding import CheckFinding, CheckState
 from swarm.model import Base, BaseId, Mission, Zone, ZoneId
+from swarm.scenario import load_scenario
+from swarm.scenario.files import resolve_scenario
 from tests.support.builders import mission, task, uav
 
 AROUND = Zone(ZoneId("moat"), ((-20.0, -20.0), (20.0, -20.0), (20.0, 20.0), (-20.0, 20.0)))
@@ -72,3 +74,19 @@ def test_a_task_that_nobody_can_do_is_named() -> None:
 
     assert found.state is CheckState.WARNING
     assert found.text == "nobody can do far, not even as the only task"
+
+
+def test_of_areas_it_is_told_what_lines_cover_and_what_pictures_are_worth() -> None:
+    hayfield = load_scenario(resolve_scenario("hayfield"))
+    fast = replace(hayfield.uavs[0], speed_m_s=30.0)
+
+    (told,) = (each for each in check_field(hayfield) if each.check == "areas")
+    _, blurred = (
+        each for each in check_field(replace(hayfield, uavs=(fast,))) if each.check == "areas"
+    )
+
+    assert told.state is CheckState.OK
+    assert told.text.startswith("hay covers 99.9")
+    assert "1.6 cm a pixel, blur 0.61 px" in told.text
+    assert blurred.state is CheckState.WARNING
+    assert blurred.text == "hay: pictures are blurred by 1.8 px"
