@@ -176,7 +176,7 @@ def go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
 def _must_stand_first(activity: Activity, order: GoTo, session: VehicleSession) -> bool:
     """Whether it must fly no mission while it is given one, nor be turned before it stands.
 
-    It would go on with the item of the same number, which may lie anywhere on the way round. And
+    It might go on with the item of the same number, which may lie anywhere on the way round. And
     what can't brake before a zone is elsewhere by the time that it turns: from there the way may
     lead through.
     """
@@ -184,6 +184,8 @@ def _must_stand_first(activity: Activity, order: GoTo, session: VehicleSession) 
     if session.slides_into_zone():
         return True
     if mission is None or heartbeat is None or firmware is None or isinstance(activity, Holding):
+        return False
+    if firmware.missions_begin_anew:
         return False
     in_mission = firmware.is_mission(heartbeat.custom_mode) or mission.may_be_flown
     return in_mission and (bool(order.via_enu_m) or mission.has_corners)

@@ -353,7 +353,10 @@ class OnboardMission:
         else:
             # One that gives way is not taken up by itself: it goes on as it was begun.
             plan = self._wanted
-            self._begin(again=not self._renewing and (plan.guided_s > 0 or bool(plan.corners)))
+            anew = plan.guided_s > 0 or (
+                bool(plan.corners) and not self._firmware.missions_begin_anew
+            )
+            self._begin(again=anew and not self._renewing)
 
     def _begin(self, *, again: bool = False) -> None:
         plan = self._standing

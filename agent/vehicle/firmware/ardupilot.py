@@ -107,6 +107,8 @@ class ArduCopter(Firmware):
     """Item 0 is home, whatever is sent as such."""
     missions_give_way = True
     """It flies to targets as in GUIDED, and to waypoints on a slower track."""
+    missions_begin_anew = False
+    """Items are taken over one by one, and the number of the current one stays."""
 
     def has_rebooted(self, before: Heartbeat, heartbeat: Heartbeat) -> bool:
         """It was past booting, and is not any more."""

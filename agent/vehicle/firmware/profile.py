@@ -95,6 +95,9 @@ class Firmware(ABC):
     """Leading items of a mission that belong to the vehicle and cannot be chosen."""
     missions_give_way: ClassVar[bool]
     """A mission may let targets be told for a time, and that is faster."""
+    missions_begin_anew: ClassVar[bool]
+    """One that takes the place of the mission that is flown is taken up as a whole, and flown from
+    where it is marked to begin; else the vehicle goes on with the item of the same number."""
     acknowledged_twice: ClassVar[frozenset[int]] = frozenset()
     """Numbers of the commands that the firmware acknowledges twice."""
 

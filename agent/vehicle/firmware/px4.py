@@ -102,6 +102,8 @@ class Px4Copter(Firmware):
     """Item 0 is flown like any other."""
     missions_give_way = False
     """It knows no such item."""
+    missions_begin_anew = True
+    """Taken over with its last item, current one included (`MavlinkMissionManager`)."""
     acknowledged_twice = frozenset({_CMD_DO_SET_MODE})
     """Within a few milliseconds."""
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from agent.core.interface import Arrived, GoTo, Home, KeepOut, Refused, Return
-from agent.vehicle.config import BridgeConfig
+from agent.vehicle.config import BridgeConfig, CommandStyle
 from swarm.allocation.legs.obstacles import Obstacles
 from swarm.model import Zone, ZoneId
 from tests.support.bridge_flight import BEHIND, ORIGIN, ROUND, WALL, BridgeFlight
-from tests.support.fake_copter import FakeCopter
+from tests.support.fake_copter import SET_MODE, FakeCopter
+from tests.support.fake_px4 import FakePx4
 
 
 @pytest.fixture
@@ -130,3 +131,20 @@ def test_many_random_paths_keep_out_of_zones(fake: type[FakeCopter]) -> None:
     flown_m = np.array([each.position_enu_m[:2] for each in flight.telemetry])
     assert inside.free(flown_m).all()
     assert np.ptp(flown_m[:, 0]) > 0.0
+
+
+def test_px4_is_given_corners_in_the_middle_of_a_mission_and_flies_on() -> None:
+    """It begins a mission anew; ArduCopter would go on with the item of the same number."""
+    stopped = {}
+    for fake in (FakeCopter, FakePx4):
+        config = BridgeConfig(1, ORIGIN, command=CommandStyle.MISSION)
+        flight = BridgeFlight(fake(ORIGIN), config).prepared()
+        flight.order(GoTo(1, BEHIND, via_enu_m=ROUND))
+        flight.run_until(Arrived(1), limit_s=120.0)
+        before = len(flight.copter.commands(SET_MODE))
+
+        flight.order(GoTo(2, (0.0, 0.0, 10.0), via_enu_m=ROUND[::-1]))
+        flight.run_until(Arrived(2), limit_s=120.0)
+
+        stopped[fake] = len(flight.copter.commands(SET_MODE)) > before
+    assert stopped == {FakeCopter: True, FakePx4: False}
