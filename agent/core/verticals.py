@@ -24,23 +24,33 @@ class Verticals:
 
     descent_m_s: float = 1.5
     """From its layer down to `low_m`: what both firmwares do unless told otherwise [m/s]."""
-    low_m: float = 10.0
-    """From here down a landing is slow: ArduCopter's LAND_ALT_LOW [m]."""
+    low_m: float = 10.5
+    """From here down a landing is slow: ArduCopter's LAND_ALT_LOW of 10 m, above which it brakes as
+    if it were to stop there, and is at `landing_m_s` as far before as that speed lasts 1 s [m]."""
     landing_m_s: float = 0.5
     """From there to the ground: ArduCopter's LAND_SPEED; PX4 lands faster [m/s]."""
+    change_m_s2: float = 1.0
+    """With which it speeds up and brakes on its way down: ArduCopter's WP_ACC_Z; PX4 is quicker
+    [m/s²]."""
     landed_s: float = 3.0
     """Until the landing mode is in force, and after touch-down until motors stand still [s]."""
     climb_m_s: float = 1.5
     """Back to its layer: PX4's MPC_TKO_SPEED; ArduCopter climbs faster [m/s]."""
-    started_s: float = 5.0
-    """For arming and motors to come up [s]."""
+    started_s: float = 6.0
+    """Until it is seen to be armed, 1 s; for motors to come up, 4 s by PX4's COM_SPOOLUP_TIME and
+    MPC_TKO_RAMP_T; until it is seen to hover at its height, 1 s."""
     apart_m: float = 8.0
     """Between the spots on which the UAVs of a fleet land at one base [m]."""
 
     def land_s(self, height_m: float) -> float:
         """From a height above the ground until it has landed [s]."""
         low_m = min(height_m, self.low_m)
-        return (height_m - low_m) / self.descent_m_s + low_m / self.landing_m_s + self.landed_s
+        fastest_m_s = self.descent_m_s if height_m > low_m else self.landing_m_s
+        # Beside a flight whose speeds change at once.
+        slower_m_s = fastest_m_s - self.landing_m_s
+        change_s = (fastest_m_s + slower_m_s**2 / fastest_m_s) / (2.0 * self.change_m_s2)
+        descent_s = (height_m - low_m) / self.descent_m_s
+        return descent_s + low_m / self.landing_m_s + change_s + self.landed_s
 
     def climb_s(self, height_m: float) -> float:
         """From the ground to a height above it [s]."""

@@ -9,7 +9,7 @@ import json
 import math
 import statistics
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,10 @@ class FlownLeg:
     def flown_frac(self) -> float:
         """Flown over planned; 1 of a leg of no length."""
         return self.flown_s / self.planned_s if self.planned_s > 0.0 else 1.0
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for `json.dumps`."""
+        return {**asdict(self), "excess_s": self.excess_s, "flown_frac": self.flown_frac}
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,6 +200,10 @@ class KeptLimits:
         charged = self.charge_frac is None or self.charge_frac >= self.reserve_frac
         return self.done == self.tasks and far and charged
 
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for `json.dumps`."""
+        return {**asdict(self), "kept": self.kept}
+
 
 def limits_kept(mission: Mission, run: Mapping[str, Any]) -> KeptLimits:
     """What the flight of ``mission`` kept of which `swarm run --json` said ``run``."""
@@ -242,6 +250,75 @@ def _items_of(problem: field.FieldProblem, entries: Sequence[Mapping[str, Any]])
     while items and items[-1] < 0:
         items.pop()
     return items
+
+
+@dataclass(frozen=True, slots=True)
+class JudgedFlight:
+    """One flight, set beside what was planned, and what it kept."""
+
+    legs: tuple[FlownLeg, ...]
+    times: LegTimes | None
+    """Of the legs; None without any."""
+    makespan_frac: float | None
+    """Flown makespan over that of the plan; None where there was no plan."""
+    flown_lists_frac: float | None
+    """The same over what the model says of the lists that were flown; None if they could not be."""
+    limits: KeptLimits
+
+    @property
+    def legs_frac(self) -> float | None:
+        """Median of flown over planned; None without a leg."""
+        return None if self.times is None else self.times.flown_frac
+
+    @property
+    def least_frac(self) -> float | None:
+        """The least of them."""
+        return None if self.times is None else self.times.least_frac
+
+    @property
+    def greatest_frac(self) -> float | None:
+        """The greatest of them."""
+        return None if self.times is None else self.times.greatest_frac
+
+    @property
+    def kept(self) -> bool:
+        """Whether legs were flown, and all limits kept."""
+        return self.times is not None and self.limits.kept
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for `json.dumps`."""
+        return {
+            "legs": [leg.as_json() for leg in self.legs],
+            "times": None if self.times is None else asdict(self.times),
+            "makespan_frac": self.makespan_frac,
+            "flown_lists_frac": self.flown_lists_frac,
+            "limits": self.limits.as_json(),
+        }
+
+
+def judge_flight(
+    mission: Mission, run: Mapping[str, Any], source: str, acceleration_m_s2: float | None
+) -> JudgedFlight:
+    """What is to be said of a flight of which `swarm run --json` said ``run``.
+
+    Args:
+        mission: the scenario.
+        run: what was said.
+        source: where that stands, for people.
+        acceleration_m_s2: of the vehicles; None if it is not known.
+
+    Raises:
+        InputError: it flew another scenario.
+    """
+    legs = tuple(legs_flown(mission, run, source))
+    by_model_s = reckoned_makespan_s(mission, run)
+    return JudgedFlight(
+        legs=legs,
+        times=leg_times(legs, acceleration_m_s2),
+        makespan_frac=makespan_frac(run),
+        flown_lists_frac=run["makespan_s"] / by_model_s if by_model_s else None,
+        limits=limits_kept(mission, run),
+    )
 
 
 def leg_times(legs: Sequence[FlownLeg], acceleration_m_s2: float | None) -> LegTimes | None:

@@ -9,11 +9,19 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from swarm.runtime.options import JsonOption
+from sim.bench.command_line import each, progress, show
+from swarm.runtime.errors import Fault, InputError, remedy_for_name
+from swarm.runtime.options import JsonOption, SeedOption, SpeedupOption
 from swarm.scenario.files import resolve_scenario
 
 if TYPE_CHECKING:
+    from agent.vehicle.config import CommandStyle
     from sim.bench.flown_legs import KeptLimits, LegTimes
+    from sim.bench.leg_flights import FlightWay
+    from swarm.model import Mission
+
+_SPEEDUP = 4.0
+"""More, and a UAV is told of by so few places that nobody can judge it by them."""
 
 
 def legs(
@@ -26,8 +34,13 @@ def legs(
         ),
     ],
     runs: Annotated[
-        list[Path], typer.Argument(metavar="RUN...", help="What swarm run --json printed.")
-    ],
+        list[Path] | None,
+        typer.Argument(
+            metavar="[RUN]...",
+            help="What swarm run --json printed; without any SCENARIO is flown.",
+            show_default=False,
+        ),
+    ] = None,
     acceleration_m_s2: Annotated[
         float | None,
         typer.Option(
@@ -39,56 +52,162 @@ def legs(
             show_default=False,
         ),
     ] = None,
+    autopilot: Annotated[
+        str | None,
+        typer.Option(
+            "--autopilot",
+            metavar="sim|sim-px4|ardupilot|px4,…",
+            help="What flies. Default: the simulated ones, and firmware where "
+            "SWARM_SITL_ARDUCOPTER and SWARM_SITL_PX4 say where it is.",
+            show_default=False,
+        ),
+    ] = None,
+    command: Annotated[
+        str | None,
+        typer.Option(
+            "--command",
+            metavar="reposition|mission,…",
+            help="How vehicles are commanded. Default: in both ways.",
+            show_default=False,
+        ),
+    ] = None,
+    speedup: SpeedupOption = _SPEEDUP,
+    seed: SeedOption = 0,
+    each_leg: Annotated[
+        bool, typer.Option("--each-leg", help="Also show every leg that was flown here.")
+    ] = False,
     json: JsonOption = False,
 ) -> int:
     """Times of legs and missions flown, beside those planned, and which limits were kept.
 
-    RUN is what swarm run --json printed of a flight of SCENARIO; several are counted together.
+    Flies SCENARIO once with every autopilot that this machine has, commanded in every way;
+    the speed-up is of simulated ones, firmware flies at wall speed. RUN is what swarm run
+    --json printed of a flight of SCENARIO: then nothing is flown, and several are counted
+    together.
     Legs go from rest to rest in the air, to tasks; planned is what plans reckon with, so
     scenarios that give no acceleration plan with length / cruise speed. Zones and batteries are
     judged by what UAVs told of themselves. Exit status 1 if no leg was flown, a task was not
     done, a UAV came nearer to a zone than the margin, or its charge fell below the reserve.
 
     Examples:
+        swarm bench legs vineyard
+        SWARM_SITL_PX4=~/PX4-Autopilot/build/px4_sitl_default swarm bench legs vineyard --each-leg
+        swarm bench legs vineyard --autopilot sim-px4 --command mission --speedup 2 --json
         swarm run vineyard --autopilot ardupilot --json > flight.json
         swarm bench legs vineyard flight.json
         swarm bench legs vineyard flight.json --acceleration-m-s2 2.5 --json
     """
-    from dataclasses import asdict
-    from json import dumps
-
-    from sim.bench.flown_legs import (
-        leg_times,
-        legs_flown,
-        limits_kept,
-        load_run,
-        makespan_frac,
-        reckoned_makespan_s,
-    )
     from swarm.scenario import load_scenario
 
     mission = load_scenario(scenario)
+    if runs:
+        for flag, text in (("--autopilot", autopilot), ("--command", command)):
+            if text is not None:
+                problem = f"nothing is flown, as {runs[0]} is read"
+                raise InputError(Fault(flag, text, problem, "leave one of them out"))
+        return _read(mission, runs, acceleration_m_s2, json=json)
+    return _fly(
+        scenario,
+        mission,
+        _ways(autopilot, command, speedup),
+        acceleration_m_s2,
+        seed=seed,
+        each_leg=each_leg,
+        json=json,
+    )
+
+
+def _ways(autopilot: str | None, command: str | None, speedup: float) -> list[FlightWay]:
+    """What is asked for, or all that this machine has."""
+    from os import environ
+
+    from agent.vehicle.config import CommandStyle
+    from sim.bench.leg_flights import SIMULATED, autopilots_here, ways
+    from sim.fleet.firmware import FirmwareKind
+
+    known = (*SIMULATED, *FirmwareKind)
+
+    def named(flag: str, word: str) -> str:
+        if word not in known:
+            raise InputError(Fault(flag, word, "no such autopilot", remedy_for_name(word, known)))
+        return word
+
+    def style(flag: str, word: str) -> CommandStyle:
+        if word not in tuple(CommandStyle):
+            remedy = remedy_for_name(word, CommandStyle)
+            raise InputError(Fault(flag, word, "no such way to command", remedy))
+        return CommandStyle(word)
+
+    here = autopilots_here(environ)
+    chosen = here if autopilot is None else each("--autopilot", autopilot, named)
+    styles = list(CommandStyle) if command is None else each("--command", command, style)
+    return ways(chosen, styles, speedup)
+
+
+def _fly(
+    scenario: Path,
+    mission: Mission,
+    flown: Sequence[FlightWay],
+    acceleration_m_s2: float | None,
+    *,
+    seed: int,
+    each_leg: bool,
+    json: bool,
+) -> int:
+    """Fly it, tell of it; the exit status."""
+    from os import environ
+
+    from rich.console import Console
+
+    from sim.bench.leg_flights import measure_legs
+
+    with progress() as tell:
+        done = measure_legs(
+            scenario,
+            mission,
+            flown,
+            environ,
+            seed=seed,
+            acceleration_m_s2=acceleration_m_s2,
+            tell=tell,
+        )
+    show(done, json=json)
+    if each_leg and not json:
+        Console(highlight=False).print(done.leg_table())
+    return 0 if done.kept else 1
+
+
+def _read(
+    mission: Mission, runs: Sequence[Path], acceleration_m_s2: float | None, *, json: bool
+) -> int:
+    """Judge flights that have been flown, together; the exit status."""
+    from dataclasses import asdict
+    from json import dumps
+
+    from sim.bench.flown_legs import judge_flight, leg_times, load_run
+
     told = [load_run(path) for path in runs]
     named = zip(told, runs, strict=True)
-    flown = [leg for run, path in named for leg in legs_flown(mission, run, str(path))]
+    judged = [judge_flight(mission, run, str(path), acceleration_m_s2) for run, path in named]
+    flown = [leg for flight in judged for leg in flight.legs]
     times = leg_times(flown, acceleration_m_s2)
-    makespans = [frac for frac in map(makespan_frac, told) if frac is not None]
-    reckoned = [(run["makespan_s"], reckoned_makespan_s(mission, run)) for run in told]
-    reckoned_fracs = [flown_s / by_model_s for flown_s, by_model_s in reckoned if by_model_s]
-    limits = [limits_kept(mission, run) for run in told]
+    makespans = [flight.makespan_frac for flight in judged if flight.makespan_frac is not None]
+    of_lists = [flight.flown_lists_frac for flight in judged if flight.flown_lists_frac is not None]
+    limits = [flight.limits for flight in judged]
     if json:
-        legs = [
-            {**asdict(leg), "excess_s": leg.excess_s, "flown_frac": leg.flown_frac} for leg in flown
-        ]
-        times_json = None if times is None else asdict(times)
-        kept = [{**asdict(each), "kept": each.kept} for each in limits]
-        found: dict[str, object] = {"scenario": mission.name, "legs": legs, "times": times_json}
-        found |= {"makespan_frac": makespans, "flown_lists_frac": reckoned_fracs, "limits": kept}
+        found: dict[str, object] = {
+            "scenario": mission.name,
+            "legs": [leg.as_json() for leg in flown],
+            "times": None if times is None else asdict(times),
+            "makespan_frac": makespans,
+            "flown_lists_frac": of_lists,
+            "limits": [limit.as_json() for limit in limits],
+        }
         typer.echo(dumps(found))
     else:
-        fracs = {"": makespans, ", of the lists as flown": reckoned_fracs}
+        fracs = {"": makespans, ", of the lists as flown": of_lists}
         typer.echo("\n  ".join(_lines(mission.name, times, fracs, limits)))
-    return 0 if times is not None and all(each.kept for each in limits) else 1
+    return 0 if times is not None and all(limit.kept for limit in limits) else 1
 
 
 def _lines(
@@ -111,10 +230,10 @@ def _lines(
     for of, fracs in makespans.items():
         if fracs:
             yield f"makespan flown / planned{of}: {median(fracs):.2f}"
-    for each in limits:
-        said = [f"{each.done} of {each.tasks} tasks done"]
-        if each.nearest_zone_m is not None:
-            said.append(f"{each.nearest_zone_m:.1f} m from a zone (margin {each.margin_m:g} m)")
-        if each.charge_frac is not None:
-            said.append(f"{each.charge_frac:.0%} charge left (reserve {each.reserve_frac:.0%})")
-        yield ", ".join(said) + ("" if each.kept else ": not kept")
+    for limit in limits:
+        said = [f"{limit.done} of {limit.tasks} tasks done"]
+        if limit.nearest_zone_m is not None:
+            said.append(f"{limit.nearest_zone_m:.1f} m from a zone (margin {limit.margin_m:g} m)")
+        if limit.charge_frac is not None:
+            said.append(f"{limit.charge_frac:.0%} charge left (reserve {limit.reserve_frac:.0%})")
+        yield ", ".join(said) + ("" if limit.kept else ": not kept")

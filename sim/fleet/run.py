@@ -15,8 +15,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.mission_view.results import MissionResult
+from coordinator.mission_view.results import MissionResult, ProtectionSummary
 from coordinator.planner.plan_report import plan_from_json
+from coordinator.terminal.report import MissionReport
 from sim.fleet.child_process import ChildFailedError, ChildProcess
 from sim.fleet.launcher import Launcher, OnLog, Through
 from sim.fleet.layout import DASHBOARD, LaunchOptions
@@ -78,6 +79,26 @@ class RunResult:
     """How processes ended that should not have, in words."""
     dropped: tuple[Mapping[str, int], ...]
     """What each UAV, and the observer, has dropped, by reason."""
+
+    def report(self, speedup: float, security: ProtectionSummary | None = None) -> MissionReport:
+        """All there is to tell of it; ``security`` is what protected it."""
+        flown = self.mission_state
+        return MissionReport(
+            mission=flown.mission,
+            plan=self.plan,
+            result=self.result,
+            story=tuple(flown.story),
+            takeoff_s=self.takeoff_s,
+            wall_s=self.wall_s,
+            speedup=speedup,
+            fates=self.fates,
+            executed_schedule=flown.executed_schedule(),
+            closest_approach_m=flown.flights.closest_approach_m,
+            nearest_zone_m=flown.limits.nearest_zone_m,
+            lowest_charge_frac=flown.limits.lowest_charge_frac,
+            left_out=flown.left_out,
+            security=security,
+        )
 
 
 class Run:

@@ -17,7 +17,6 @@ from rich.console import Console
 
 from coordinator.core.heights import height_warning
 from coordinator.terminal.live_view import LiveView
-from coordinator.terminal.report import MissionReport
 from sim.fleet.layout import LaunchOptions
 from sim.fleet.run import fly
 from sim.fleet.security import security_of
@@ -91,22 +90,7 @@ class ShownRun:
         except asyncio.CancelledError:
             self._console.print("interrupted: the mission was given up and every process ended")
             raise
-        told = MissionReport(
-            mission=flight.mission_state.mission,
-            plan=flight.plan,
-            result=flight.result,
-            story=tuple(flight.mission_state.story),
-            takeoff_s=flight.takeoff_s,
-            wall_s=flight.wall_s,
-            speedup=self._speedup,
-            fates=flight.fates,
-            executed_schedule=flight.mission_state.executed_schedule(),
-            closest_approach_m=flight.mission_state.flights.closest_approach_m,
-            nearest_zone_m=flight.mission_state.limits.nearest_zone_m,
-            lowest_charge_frac=flight.mission_state.limits.lowest_charge_frac,
-            left_out=flight.mission_state.left_out,
-            security=security_of(options, self._mission, flight.dropped),
-        )
+        told = flight.report(self._speedup, security_of(options, self._mission, flight.dropped))
         status = print_report(told, json=outputs.json, report=outputs.report)
         return status or int(recorder is not None and recorder.fault is not None)
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import json
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import pytest
+from rich.console import Console
 
+from agent.vehicle.config import CommandStyle
 from coordinator.planner.plan_report import schedule_as_json
 from sim.bench.flown_legs import (
+    judge_flight,
     leg_times,
     legs_flown,
     limits_kept,
@@ -18,7 +22,9 @@ from sim.bench.flown_legs import (
     makespan_frac,
     reckoned_makespan_s,
 )
+from sim.bench.leg_flights import LegFlight, LegFlights, autopilots_here, ways
 from sim.bench.legs import legs as bench_legs
+from sim.bench.machine import this_machine
 from sim.world.simulation import simulate_mission
 from sim.world.uncertainty import Uncertainty
 from swarm.model import TaskId, UavId
@@ -189,6 +195,58 @@ def test_the_command_tells_what_is_found_and_fails_where_a_limit_is_not_kept(
         f"  makespan flown / planned, of the lists as flown: {found['flown_lists_frac'][0]:.2f}",
         "  5 of 6 tasks done: not kept",
     ]
+
+
+def test_everything_that_is_there_is_flown_in_both_ways_and_firmware_at_wall_speed() -> None:
+    assert autopilots_here({}) == ("sim", "sim-px4")
+    here = autopilots_here({"SWARM_SITL_PX4": "/opt/px4", "SWARM_SITL_ARDUCOPTER": ""})
+    assert here == ("sim", "sim-px4", "px4")
+    flown = ways(here, list(CommandStyle), 4.0)
+    assert {(way.autopilot, way.speedup, way.real) for way in flown} == {
+        ("sim", 4.0, False),
+        ("sim-px4", 4.0, False),
+        ("px4", 1.0, True),
+    }
+    assert len(set(flown)) == 6
+
+
+def test_flights_are_told_with_their_legs_and_what_was_not_flown() -> None:
+    done = sorted(task.id for task in MEADOW.tasks)
+    late = {**FLOWN, "done": done[1:]}
+    by_targets, by_missions = ways(["sim"], [CommandStyle.REPOSITION, CommandStyle.MISSION], 4.0)
+    flights = [
+        LegFlight(way, judge_flight(MEADOW, run, "here", None))
+        for way, run in ((by_targets, {**FLOWN, "done": done}), (by_missions, late))
+    ]
+    kept = LegFlights(this_machine(), "meadow", 0, (flights[0],), ("px4",))
+    broken = LegFlights(this_machine(), "meadow", 0, tuple(flights))
+
+    assert kept.kept
+    assert not broken.kept
+    told = json.loads(json.dumps(broken.as_json(), allow_nan=False))["flights"][1]
+    assert (told["autopilot"], told["command"], told["real"]) == ("sim", "mission", False)
+    assert [leg["flown_s"] for leg in told["legs"]] == [12.0, 11.0, 11.0]
+    assert (told["limits"]["done"], told["limits"]["kept"]) == (5, False)
+    console = Console(width=120, record=True, file=io.StringIO())
+    console.print(kept, kept.leg_table())
+    shown = " ".join(console.export_text().split())
+    assert "sim, reposition 1.3" in shown
+    assert "6/6" in shown
+    assert "Not flown: px4; not set: SWARM_SITL_PX4." in shown
+    assert "west-far" in shown
+
+
+@pytest.mark.parametrize(
+    ("option", "problem"),
+    [
+        ({"autopilot": "sim,arduplane"}, "no such autopilot"),
+        ({"command": "guided"}, "no such way to command"),
+        ({"runs": [Path("flight.json")], "command": "mission"}, "nothing is flown"),
+    ],
+)
+def test_what_cannot_be_flown_is_refused_at_once(option: dict[str, Any], problem: str) -> None:
+    with pytest.raises(InputError, match=problem):
+        bench_legs(resolve_scenario("meadow"), **option)
 
 
 @pytest.mark.parametrize(
