@@ -58,10 +58,15 @@ STYLES = pytest.mark.parametrize("style", list(CommandStyle))
 class JoinedFlight:
     """Both machines in one virtual time that leaps from deadline to deadline."""
 
-    def __init__(self, config: BridgeConfig = CONFIG, flavour: FirmwareModel | None = None) -> None:
+    def __init__(
+        self,
+        config: BridgeConfig = CONFIG,
+        flavour: FirmwareModel | None = None,
+        vehicle: VehicleConfig = VEHICLE,
+    ) -> None:
         self.now_s = 0.0
         self.bridge = Bridge(config)
-        self.vehicle = SimulatedAutopilot(VEHICLE, flavour or ArduCopterModel(), self.now_s)
+        self.vehicle = SimulatedAutopilot(vehicle, flavour or ArduCopterModel(), self.now_s)
         self.codec = ChannelCodec(1, COMPONENT_ID, datagrams=False)
         self.reports: list[tuple[float, VehicleReport]] = []
         self.track_enu_m: list[tuple[float, float, float]] = []
@@ -127,10 +132,12 @@ class JoinedFlight:
         raise AssertionError(f"no {report} within {limit_s} s, only {self.reports}")
 
 
-def joined(flavour: FirmwareModelName, style: CommandStyle) -> JoinedFlight:
+def joined(
+    flavour: FirmwareModelName, style: CommandStyle, vehicle: VehicleConfig = VEHICLE
+) -> JoinedFlight:
     """The bridge, commanding that way, and a vehicle of that firmware."""
     config = replace(CONFIG, command=style, mission_patience_s=PATIENCE_S)
-    return JoinedFlight(config, firmware_model(flavour))
+    return JoinedFlight(config, firmware_model(flavour), vehicle)
 
 
 def started(flavour: FirmwareModelName, style: CommandStyle) -> JoinedFlight:

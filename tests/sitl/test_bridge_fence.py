@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 import shapely
@@ -21,10 +22,11 @@ from agent.core.interface import (
 )
 from agent.vehicle.config import CommandStyle
 from sim.autopilot import events as autopilot
+from sim.autopilot.config import VehicleConfig
 from sim.autopilot.firmware import FirmwareModelName
 from swarm.model import Zone, ZoneId
 from swarm.model.frames import wgs84_from_enu
-from tests.sitl.test_bridge_autopilot import FLAVOURS, START, STYLES, JoinedFlight, joined
+from tests.sitl.test_bridge_autopilot import FLAVOURS, START, STYLES, VEHICLE, JoinedFlight, joined
 from tests.support.bridge_flight import ORIGIN
 
 pytestmark = pytest.mark.sitl
@@ -49,9 +51,14 @@ def forbids(flight: JoinedFlight, east_m: float, north_m: float) -> bool:
     return not flight.vehicle.pilot.fence.allows((east_m, north_m, 10.0))
 
 
-def fenced(flavour: FirmwareModelName, style: CommandStyle, *zones: Zone) -> JoinedFlight:
+def fenced(
+    flavour: FirmwareModelName,
+    style: CommandStyle,
+    *zones: Zone,
+    vehicle: VehicleConfig = VEHICLE,
+) -> JoinedFlight:
     """A vehicle that hovers at its start, with these zones told before."""
-    flight = joined(flavour, style)
+    flight = joined(flavour, style, vehicle)
     flight.to_bridge(KeepOut(zones, 3.0))
     flight.to_bridge(START)
     flight.run_until(VehicleReady())
@@ -113,6 +120,27 @@ def test_a_zone_drawn_over_it_is_heeded_once_it_has_left(
     flight.run_until(Arrived(2))
     flight.wait(5.0)
     assert corners_on(flight) == 8
+    assert undisturbed(flight)
+
+
+@FLAVOURS
+@STYLES
+def test_a_zone_drawn_right_before_it_is_not_on_it_before_it_has_turned_away(
+    flavour: FirmwareModelName, style: CommandStyle
+) -> None:
+    heavy = replace(VEHICLE, acceleration_m_s2=1.5, rounds_corners=True)
+    flight = fenced(flavour, style, vehicle=heavy)
+    flight.to_bridge(GoTo(1, (200.0, 0.0, 10.0)))
+    flight.wait(12.0)
+    east_m, north_m, _ = flight.track_enu_m[-1]
+    near_m = east_m + 2.0
+    ahead = ((near_m, -40.0), (near_m + 30.0, -40.0), (near_m + 30.0, 40.0), (near_m, 40.0))
+    flight.to_bridge(KeepOut((Zone(ZoneId("ahead"), ahead),), 0.0))
+    flight.to_bridge(GoTo(2, (east_m - 30.0, north_m, 10.0)))
+    flight.run_until(Arrived(2))
+    assert max(at[0] for at in flight.track_enu_m) > near_m  # nobody stops in no time
+    flight.wait(5.0)
+    assert corners_on(flight) == 4
     assert undisturbed(flight)
 
 
