@@ -14,6 +14,7 @@ from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
 
 from agent.core.interface import HandedOver, VehicleOrder, VehicleReport
 from agent.links.link import ByteLink, open_link
+from agent.links.vehicle_clock import VehicleClock
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig, UdpOutAddress, parse_forward, parse_link
 from agent.vehicle.conversation import SendBytes
@@ -25,6 +26,8 @@ from swarm.runtime.log import get_logger
 
 TURNAROUNDS = "next targets sent"
 """Event in whose log line a vehicle tells how long each next target took."""
+CLOCK = "clock of the vehicle"
+"""Event in whose log line it tells how many seconds of its clock passed in one of ours."""
 
 
 _SHORTEST_WAIT_S = 0.001
@@ -69,6 +72,7 @@ class MavlinkVehicle:
         self._told_dropped: set[str] = set()
         self._told_unchecked = False
         self._meter = TurnaroundMeter()
+        self._vehicle_clock = VehicleClock()
         self._clock = clock
         self._on_report = on_report
         self._reports: deque[VehicleReport] = deque()
@@ -110,6 +114,8 @@ class MavlinkVehicle:
         await self.link.close()
         await self._forwarding.close()
         self._tell_turnarounds()
+        if (frac := self._vehicle_clock.frac) is not None:
+            self._log.info(CLOCK, clock_frac=round(frac, 4))
 
     def link_up(self) -> None:
         """Called by the link."""
@@ -123,6 +129,8 @@ class MavlinkVehicle:
         """Called by the link."""
         self._meter.received(self._clock.now_s())
         self._happen(BytesReceived(data, source))
+        if (boot_s := self.bridge.boot_s) is not None:
+            self._vehicle_clock.note(boot_s, self._clock.now_s())
         self._forwarding.show(self.bridge.codec.take_frames())
         self._tell_of_dropped()
 

@@ -100,6 +100,12 @@ class Bridge:
         return self._session.contact
 
     @property
+    def boot_s(self) -> float | None:
+        """How long ago the vehicle has booted, as it told last [s of its clock]; None: not told."""
+        position = self._session.vehicle.position
+        return None if position is None else position.boot_s
+
+    @property
     def absurd_parameters(self) -> int:
         """How many parameters of the vehicle have values that nobody would believe."""
         return len(self._session.absurd_parameters)

@@ -271,16 +271,6 @@ class JudgedFlight:
         return None if self.times is None else self.times.flown_frac
 
     @property
-    def least_frac(self) -> float | None:
-        """The least of them."""
-        return None if self.times is None else self.times.least_frac
-
-    @property
-    def greatest_frac(self) -> float | None:
-        """The greatest of them."""
-        return None if self.times is None else self.times.greatest_frac
-
-    @property
     def kept(self) -> bool:
         """Whether legs were flown, and all limits kept."""
         return self.times is not None and self.limits.kept

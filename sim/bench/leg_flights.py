@@ -11,10 +11,12 @@ import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from statistics import median
 from typing import Any, Final
 
 from rich.console import RenderableType
 
+from agent.links.mavlink_vehicle import CLOCK
 from agent.vehicle.config import CommandStyle
 from sim.bench.command_line import launch_options
 from sim.bench.flown_legs import FlownLeg, JudgedFlight, judge_flight
@@ -22,6 +24,7 @@ from sim.bench.machine import this_machine
 from sim.bench.results import BenchResult, Progress, table_of, unheard
 from sim.fleet.autopilots import parse_autopilots
 from sim.fleet.firmware import FirmwareKind
+from sim.fleet.launcher import OnLog
 from sim.fleet.layout import BusKind, LaunchOptions, defaults_for
 from sim.fleet.passthrough import PassthroughOptions, fence_around
 from sim.fleet.run import fly
@@ -69,11 +72,27 @@ class LegFlight:
 
     way: FlightWay
     judged: JudgedFlight
+    clock_frac: float | None
+    """Seconds of the vehicles' clocks in one of the mission's, their median; None: not told."""
 
     @property
     def flown_by(self) -> str:
         """What flew it, for people."""
         return f"{self.way.autopilot}, {self.way.command}"
+
+    @property
+    def spread(self) -> str | None:
+        """Least and greatest of flown over planned, for people."""
+        times = self.judged.times
+        return None if times is None else f"{times.least_frac:.2f}–{times.greatest_frac:.2f}"
+
+    @property
+    def own_legs_frac(self) -> float | None:
+        """Median of flown over planned by the vehicles' own clocks."""
+        legs_frac = self.judged.legs_frac
+        if legs_frac is None or self.clock_frac is None:
+            return None
+        return legs_frac * self.clock_frac
 
     @property
     def done(self) -> str:
@@ -105,7 +124,12 @@ class LegFlights(BenchResult):
     def as_json(self) -> dict[str, Any]:
         """Everything, ready for `json.dumps`."""
         flights = [
-            {**asdict(each.way), "real": each.way.real, **each.judged.as_json()}
+            {
+                **asdict(each.way),
+                "real": each.way.real,
+                "clock_frac": each.clock_frac,
+                **each.judged.as_json(),
+            }
             for each in self.flights
         ]
         machine, head = asdict(self.machine), {"scenario": self.scenario, "seed": self.seed}
@@ -119,8 +143,8 @@ class LegFlights(BenchResult):
             self.flights,
             Column("flown by", words=True, key="flown_by"),
             Column("legs", ".2f", key="judged.legs_frac"),
-            Column("from", ".2f", key="judged.least_frac"),
-            Column("to", ".2f", key="judged.greatest_frac"),
+            Column("spread", key="spread"),
+            Column("own clock", ".2f", key="own_legs_frac"),
             Column("mission", ".2f", key="judged.makespan_frac"),
             Column("as listed", ".2f", key="judged.flown_lists_frac"),
             Column("done", key="done"),
@@ -128,8 +152,9 @@ class LegFlights(BenchResult):
             Column("charge", ".0f", "%", 100.0, key="judged.limits.charge_frac"),
         )
         yield (
-            "legs: median of flown over planned, and its spread; mission: makespan over the "
-            "plan's; as listed: over the model's for the lists that were flown."
+            "legs: median of flown over planned, and its spread; own clock: the same by the "
+            "vehicles' clocks, which lag where a simulator does not keep up; mission: makespan "
+            "over the plan's; as listed: over the model's for the lists that were flown."
         )
         if limits is not None:
             yield (
@@ -183,15 +208,27 @@ def measure_legs(
     flights = []
     for way, options in planned:
         tell(f"{way.autopilot}, {way.command}, {way.speedup:g} times wall speed")
-        flown = asyncio.run(fly(mission, options))
+        clocks: list[float] = []
+        flown = asyncio.run(fly(mission, options, on_log=_clock_reader(clocks)))
         # As a program reads it that is given what `swarm run --json` prints.
         told = json.loads(json.dumps(flown.report(way.speedup).as_json()))
         source = f"{way.autopilot}, {way.command}"
-        flights.append(LegFlight(way, judge_flight(mission, told, source, acceleration_m_s2)))
+        judged = judge_flight(mission, told, source, acceleration_m_s2)
+        flights.append(LegFlight(way, judged, median(clocks) if clocks else None))
     flown_with = {way.autopilot for way in each_way}
     lacking = set(FirmwareKind) - set(autopilots_here(environment)) - flown_with
     not_here = tuple(kind.value for kind in FirmwareKind if kind in lacking)
     return LegFlights(this_machine(), mission.name, seed, tuple(flights), not_here)
+
+
+def _clock_reader(clocks: list[float]) -> OnLog:
+    """Gathers what agents log of their vehicles' clocks."""
+
+    def on_log(_name: str, line: str) -> None:
+        if CLOCK in line:
+            clocks.append(float(json.loads(line)["clock_frac"]))
+
+    return on_log
 
 
 def _options(

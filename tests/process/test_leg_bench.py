@@ -33,4 +33,5 @@ def test_a_scenario_is_flown_and_its_legs_are_set_beside_the_model() -> None:
         assert (flight["limits"]["done"], flight["limits"]["tasks"]) == (6, 6)
         assert len(flight["legs"]) == 6
         assert flight["times"]["flown_frac"] > 0.9
+        assert 0.5 < flight["clock_frac"] < 1.5
         assert flight["makespan_frac"] > 0.9

@@ -215,7 +215,7 @@ def test_flights_are_told_with_their_legs_and_what_was_not_flown() -> None:
     late = {**FLOWN, "done": done[1:]}
     by_targets, by_missions = ways(["sim"], [CommandStyle.REPOSITION, CommandStyle.MISSION], 4.0)
     flights = [
-        LegFlight(way, judge_flight(MEADOW, run, "here", None))
+        LegFlight(way, judge_flight(MEADOW, run, "here", None), 0.5)
         for way, run in ((by_targets, {**FLOWN, "done": done}), (by_missions, late))
     ]
     kept = LegFlights(this_machine(), "meadow", 0, (flights[0],), ("px4",))
@@ -230,7 +230,10 @@ def test_flights_are_told_with_their_legs_and_what_was_not_flown() -> None:
     console = Console(width=120, record=True, file=io.StringIO())
     console.print(kept, kept.leg_table())
     shown = " ".join(console.export_text().split())
-    assert "sim, reposition 1.3" in shown
+    times = flights[0].judged.times
+    assert times is not None
+    assert f"sim, reposition {times.flown_frac:.2f}" in shown
+    assert f"{0.5 * times.flown_frac:.2f}" in shown
     assert "6/6" in shown
     assert "Not flown: px4; not set: SWARM_SITL_PX4." in shown
     assert "west-far" in shown
