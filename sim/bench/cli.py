@@ -24,7 +24,7 @@ from sim.bench.command_line import (
     sizes_of,
     write_file,
 )
-from sim.bench.legs import legs
+from sim.bench.leg_commands import legs
 from sim.bench.performance_commands import (
     autopilot,
     bound,

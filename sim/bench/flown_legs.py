@@ -1,6 +1,6 @@
 """How long vehicles take for legs and missions, beside what plans reckon with, and what they keep.
 
-Leaves out: how that is asked for and told (sim.bench.legs).
+Leaves out: how that is asked for and told (sim.bench.leg_commands).
 """
 
 from __future__ import annotations

@@ -22,8 +22,8 @@ from sim.bench.flown_legs import (
     makespan_frac,
     reckoned_makespan_s,
 )
+from sim.bench.leg_commands import legs as bench_legs
 from sim.bench.leg_flights import LegFlight, LegFlights, autopilots_here, ways
-from sim.bench.legs import legs as bench_legs
 from sim.bench.machine import this_machine
 from sim.world.simulation import simulate_mission
 from sim.world.uncertainty import Uncertainty
