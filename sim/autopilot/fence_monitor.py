@@ -96,8 +96,6 @@ class FenceMonitor:
         if self._check_s is not None:
             self._check_s = now_s + _CHECK_S  # nobody has looked while there was none
         self._look(now_s, acts=self._pilot.armed and not self._pilot.flight.on_ground)
-        if self._check_s is not None:  # without a fence nobody has looked for long
-            self._check_s = now_s + _CHECK_S
         added = self._pilot.flavour.fence_behaviour.inclusions_add
         home_m = self._pilot.flight.home_enu_m[:2]
         if not self._store.fence.allows(home_m, any_inclusion=added):
