@@ -72,6 +72,7 @@ class AreaCoverage:
         whole_m2 = self.to_cover_m2
         if whole_m2 == 0.0:
             return 1.0
-        lines = [line for name, line in self.lines.items() if name in flown]
+        names = set(flown)
+        lines = [line for name, line in self.lines.items() if name in names]
         met = shapely.intersection(self.to_cover, covered(self.area, lines))
         return min(1.0, float(shapely.area(met)) / whole_m2)

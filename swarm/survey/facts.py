@@ -58,14 +58,16 @@ def area_facts(
         planned: tasks on any list.
         flown: tasks that were done; a line that was left half way is not. None: nobody has flown.
     """
-    return tuple(_facts(mission, area, planned, flown) for area in mission.areas)
+    on_lists = frozenset(planned)
+    done = None if flown is None else frozenset(flown)
+    return tuple(_facts(mission, area, on_lists, done) for area in mission.areas)
 
 
 def _facts(
     mission: Mission,
     area: Area,
-    planned: Collection[TaskId],
-    flown: Collection[TaskId] | None,
+    planned: frozenset[TaskId],
+    flown: frozenset[TaskId] | None,
 ) -> AreaFacts:
     coverage = AreaCoverage(area, mission.tasks, mission.zones, mission.zone_margin_m)
     lengths_m = [_length_m(line) for line in coverage.lines.values()]
