@@ -1,7 +1,7 @@
 """Read a scenario file: TOML in, a validated mission out, every fault at once.
 
-Only what is no TOML at all stops early. A mission without any task is wrong
-unless it says so itself with ``task = []``: forgetting the tasks is likelier
+Only what is no TOML at all stops early. A mission without any task or area is
+wrong unless it says so itself with ``task = []``: forgetting the tasks is likelier
 than waiting for an operator to add them.
 """
 
@@ -87,6 +87,8 @@ def build_mission(document: Document, source: str, tasks: TaskFile | None = None
     """
     from swarm.scenario.shapes import validate
 
+    if document.get("area"):  # its lines are tasks enough
+        document = {"task": [], **document}
     own = document.get("task")
     more = () if tasks is None else tasks.entries
     if tasks is not None and isinstance(own, list):

@@ -26,7 +26,7 @@ def format_scenario(mission: Mission) -> str:
     """
     areas, rest = _areas_and_other_tasks(mission)
     head: dict[str, object] = {"name": mission.name}
-    if not rest:
+    if not rest and not areas:
         head["task"] = []
     rules = ("horizon_s", "success_default", "survival_default", "reattempt_failed")
     table = {key: getattr(mission, key) for key in rules} | _field_rules(mission)

@@ -15,7 +15,6 @@ from tests.support.small_scenario import faults
 VALID = """\
 schema = 2
 name = "survey"
-task = []
 
 [mission]
 horizon_s = 600.0
@@ -252,8 +251,8 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
         ],
     ),
     "line with the id of a task": (
-        "task = []\n",
-        'task = [{ id = "meadow-03", position_m = [0.0, 0.0], value = 1.0 }]\n',
+        'name = "survey"\n',
+        'name = "survey"\ntask = [{ id = "meadow-03", position_m = [0.0, 0.0], value = 1.0 }]\n',
         [
             (
                 "area[0] \"meadow\".id: its line 'meadow-03' has the id of task[0]; "
@@ -312,7 +311,7 @@ def read(text: str = VALID) -> Mission:
 
 def test_lines_of_areas_follow_the_tasks_and_share_the_value_by_length() -> None:
     own = 'task = [{ id = "t1", position_m = [0.0, -20.0], value = 1.0 }]'
-    mission = read(VALID.replace("task = []", own))
+    mission = read(VALID.replace("\n\n", f"\n{own}\n\n", 1))
     meadow, slope = mission.areas
     lines = {task.id: task for task in mission.tasks}
 
