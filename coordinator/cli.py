@@ -123,16 +123,16 @@ def plan(
     from coordinator.planner.plan import make_plan
     from coordinator.planner.plan_report import plan_as_json, plan_table
     from swarm.model.layers import FlightLayers
-    from swarm.scenario import load_scenario, require_plain
+    from swarm.scenario import load_scenario
 
     check_plan_options(method, plot, firmware, None if bound else bound_s)
     mission = load_scenario(scenario)
     if (warning := height_warning(mission, FlightLayers())) is not None:
         print(f"warning: {warning}", file=sys.stderr)
     if export is not None:
-        from coordinator.export import require_origin
+        from coordinator.export import require_exportable, require_origin
 
-        require_plain(mission, "swarm plan --export")
+        require_exportable(mission, str(scenario))
         require_origin(mission, str(scenario))
     try:
         with _searching() as (interrupted, progress, proving):
@@ -189,8 +189,12 @@ def _export(folder: Path, mission: Mission, made: Plan, firmware: str) -> None:
         raise InputError(Fault("--export", "", problem, "name a folder that can be")) from error
     idle = [uav for uav, route in made.routes.items() if not route]
     without = f"; none for {', '.join(idle)}, without tasks" if idle else ""
-    plans = "1 plan" if len(written) == 1 else f"{len(written)} plans"
+    plans = "1 plan" if len(written.files) == 1 else f"{len(written.files)} plans"
     print(f"exported: {plans} into {folder}{without}", file=sys.stderr)
+    if written.unfenced:
+        zones = ", ".join(written.unfenced)
+        told = "UAVs may fly above or below them"
+        print(f"note: not in the geofence of every plan, as {told}: {zones}", file=sys.stderr)
 
 
 def _status_line() -> contextlib.AbstractContextManager[Status | None]:

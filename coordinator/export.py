@@ -1,8 +1,9 @@
-"""A plan as QGroundControl plans (``.plan``), one for every UAV that has tasks.
+"""A plan as QGroundControl plans (``.plan``), one for every sortie of every UAV that has tasks.
 
-Take-off into the UAV's height layer, cruise speed, one waypoint per task with its service as hold
-time, return to launch. Heights are above the UAV's start, which is the home of its plan.
-There are no geofences and no rally points.
+Take-off into the UAV's height layer, cruise speed, its tasks, and the way back: return to launch,
+or a landing at the base where a battery is changed, from which its next plan takes off. Zones are
+the geofence as far as they lie in the way at every height that it flies at. Heights are above the
+place of take-off, which is the home of the plan. There are no rally points.
 
 Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html.
 """
@@ -12,20 +13,38 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from swarm.model import Mission, Origin, Plan, Task, Uav
+from coordinator.sorties import SortieItems, sorties_of
+from swarm.model import Mission, Origin, Plan, Zone, ZoneId
+from swarm.model.fence_rings import blocks_all_heights, fence_rings
 from swarm.model.frames import wgs84_from_enu
 from swarm.model.layers import FlightLayers
 from swarm.runtime.errors import Fault, InputError
-from swarm.scenario.task_files.mission_items import MavCommand, MavFrame
 from swarm.scenario.task_files.plan_file import LAYER_KEY
 
 _QUADROTOR = 2
 _RELATIVE = 1
-_GROUND_SPEED = 1
-_THROTTLE_AS_IT_IS = -1
+_HEEDED = frozenset(
+    {
+        "acceleration_m_s2",
+        "airspeed_m_s",
+        "endurance_s",
+        "due_s",
+        "opens_s",
+        "closes_s",
+        "path_m",
+        "trigger_m",
+        "height_m",
+        "wind_m_s",
+        "base",
+        "zone",
+        "band_m",
+    }
+)
+"""What a mission may ask for, by the keys of a scenario."""
 
 
 class ExportFirmware(Enum):
@@ -37,6 +56,15 @@ class ExportFirmware(Enum):
 
 _AUTOPILOT = {ExportFirmware.ARDUPILOT: 3, ExportFirmware.PX4: 12}
 """MAV_AUTOPILOT."""
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """What has been written."""
+
+    files: Sequence[Path]
+    unfenced: Sequence[ZoneId]
+    """Zones that are part of no geofence: a vehicle may fly above or below them."""
 
 
 def require_origin(mission: Mission, source: str) -> Origin:
@@ -51,10 +79,22 @@ def require_origin(mission: Mission, source: str) -> Origin:
     return mission.origin
 
 
-def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: ExportFirmware) -> list[Path]:
+def require_exportable(mission: Mission, source: str) -> None:
+    """Refuse a mission that asks for more than a plan of QGroundControl is given.
+
+    Raises:
+        InputError: with what that is.
+    """
+    if asked := [key for key in mission.constraints if key not in _HEEDED]:
+        problem = f"asks for {', '.join(asked)}, which exported plans do not heed"
+        raise InputError(Fault(source, "", problem, "plan without --export"))
+
+
+def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: ExportFirmware) -> Exported:
     """Write ``<mission>.<uav>.plan`` into ``folder`` for every UAV that has tasks.
 
-    A UAV without tasks gets none, and loses the one of an earlier plan.
+    Its sorties from the second on are in ``<mission>.<uav>.sortie2.plan`` and so on. Files of
+    earlier plans that are not written again go.
 
     Raises:
         InputError: the mission has no origin.
@@ -63,28 +103,45 @@ def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: ExportFirm
     origin = require_origin(mission, mission.name)
     folder.mkdir(parents=True, exist_ok=True)
     layers = FlightLayers()
-    tasks = {task.id: task for task in mission.tasks}
-    written = []
+    written: list[Path] = []
+    unfenced: dict[ZoneId, None] = {}
     for index, uav in enumerate(mission.uavs):
-        path = folder / f"{mission.name}.{uav.id}.plan"
-        route = [tasks[task] for task in plan.routes[uav.id]]
-        if not route:
-            path.unlink(missing_ok=True)
-            continue
-        document = uav_plan(uav, route, origin, layers.layer_m(index), firmware)
-        path.write_text(json.dumps(document, indent=4, allow_nan=False) + "\n", encoding="utf-8")
-        written.append(path)
-    return written
+        sorties = sorties_of(mission, plan, uav)
+        for number, sortie in enumerate(sorties, start=1):
+            items = SortieItems(sortie, uav, layers.layer_m(index), origin)
+            zones = [zone for zone in mission.zones if not _blocks(zone, items)]
+            unfenced |= dict.fromkeys(zone.id for zone in zones)
+            document = sortie_plan(items, mission.zones, firmware)
+            path = folder / _name(mission, uav.id, number)
+            text = json.dumps(document, indent=4, allow_nan=False) + "\n"
+            path.write_text(text, encoding="utf-8")
+            written.append(path)
+        number = len(sorties) + 1
+        while (stale := folder / _name(mission, uav.id, number)).exists() or number == 1:
+            stale.unlink(missing_ok=True)
+            number += 1
+    return Exported(written, tuple(unfenced))
 
 
-def uav_plan(
-    uav: Uav, route: Sequence[Task], origin: Origin, layer_m: float, firmware: ExportFirmware
+def _name(mission: Mission, uav: str, number: int) -> str:
+    sortie = "" if number == 1 else f".sortie{number}"
+    return f"{mission.name}.{uav}{sortie}.plan"
+
+
+def sortie_plan(
+    items: SortieItems, zones: Sequence[Zone], firmware: ExportFirmware
 ) -> dict[str, object]:
-    """The plan of one UAV, ready for `json.dumps`; ``layer_m`` above the places it visits [m]."""
-    home_alt_m = origin.alt_m + uav.position_enu_m[2]
+    """The plan of one sortie, ready for `json.dumps`."""
+    uav, origin = items.uav, items.origin
+    listed, tasks = items.listed()
+    home_alt_m = origin.alt_m + items.sortie.start_enu_m[2]
     return {
         "fileType": "Plan",
-        "geoFence": {"circles": [], "polygons": [], "version": 2},
+        "geoFence": {
+            "circles": [],
+            "polygons": list(_polygons([each for each in zones if _blocks(each, items)], origin)),
+            "version": 2,
+        },
         "groundStation": "Peckorder",
         "mission": {
             "cruiseSpeed": uav.speed_m_s,
@@ -93,49 +150,32 @@ def uav_plan(
             "hoverSpeed": uav.speed_m_s,
             "items": [
                 {**item, "autoContinue": True, "doJumpId": number, "type": "SimpleItem"}
-                for number, item in enumerate(_items(uav, route, origin, layer_m), start=1)
+                for number, item in enumerate(listed, start=1)
             ],
-            "plannedHomePosition": [*_lat_lon_deg(origin, uav.position_enu_m), home_alt_m],
+            "plannedHomePosition": [*items.lat_lon_deg(items.sortie.start_enu_m), home_alt_m],
             "vehicleType": _QUADROTOR,
             "version": 2,
         },
-        LAYER_KEY: {"layer_m": layer_m},
+        LAYER_KEY: {"layer_m": items.layer_m, "tasks": [task.as_json() for task in tasks]},
         "rallyPoints": {"points": [], "version": 2},
         "version": 1,
     }
 
 
-def _lat_lon_deg(origin: Origin, point_enu_m: tuple[float, float, float]) -> tuple[float, float]:
-    lat_deg, lon_deg, _ = wgs84_from_enu(origin, point_enu_m)
+def _blocks(zone: Zone, items: SortieItems) -> bool:
+    """Whether a zone may be part of the geofence of who flies these items, take-off included."""
+    return blocks_all_heights(zone, *items.height_range_m())
+
+
+def _polygons(zones: Sequence[Zone], origin: Origin) -> Iterator[dict[str, object]]:
+    for zone in zones:
+        for ring in fence_rings(zone):
+            corners = [_corner_deg(origin, corner) for corner in ring.corners_enu_m]
+            yield {"inclusion": ring.inclusive, "polygon": corners, "version": 1}
+
+
+def _corner_deg(origin: Origin, corner_enu_m: tuple[float, float]) -> list[float]:
+    lat_deg, lon_deg, _ = wgs84_from_enu(origin, (*corner_enu_m, 0.0))
     if abs(lon_deg) > 180.0:  # beyond the date line
         lon_deg -= math.copysign(360.0, lon_deg)
-    return lat_deg, lon_deg
-
-
-def _items(
-    uav: Uav, route: Sequence[Task], origin: Origin, layer_m: float
-) -> Iterator[dict[str, object]]:
-    def place(point_enu_m: tuple[float, float, float]) -> tuple[float, float, float]:
-        """Latitude, longitude [deg] and height above the UAV's start [m], in its layer."""
-        height_m = point_enu_m[2] - uav.position_enu_m[2] + layer_m
-        return *_lat_lon_deg(origin, point_enu_m), height_m
-
-    yield _at(MavCommand.TAKEOFF, 0.0, place(uav.position_enu_m))
-    speed = [_GROUND_SPEED, uav.speed_m_s, _THROTTLE_AS_IT_IS, 0, 0, 0, 0]
-    yield {"command": int(MavCommand.CHANGE_SPEED), "frame": int(MavFrame.MISSION), "params": speed}
-    for task in route:
-        yield _at(MavCommand.WAYPOINT, task.service_s, place(task.position_enu_m))
-    home = {"command": int(MavCommand.RETURN_TO_LAUNCH), "frame": int(MavFrame.MISSION)}
-    yield {**home, "params": [0] * 7}
-
-
-def _at(command: MavCommand, first: float, place: tuple[float, float, float]) -> dict[str, object]:
-    """An item at a place; no heading, so the vehicle keeps to its own setting."""
-    return {
-        "AMSLAltAboveTerrain": None,
-        "Altitude": place[2],
-        "AltitudeMode": _RELATIVE,
-        "command": int(command),
-        "frame": int(MavFrame.GLOBAL_RELATIVE),
-        "params": [first, 0, 0, None, *place],
-    }
+    return [lat_deg, lon_deg]

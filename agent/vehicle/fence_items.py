@@ -1,34 +1,26 @@
 """Zones as the items of a firmware's own fence, and items told as areas again.
 
-A firmware's polygons have no heights and no holes. So only a zone that reaches from the ground up
-to wherever the vehicle may be made to fly becomes one; a hole in a zone to keep out of is left out
-by cutting the zone into pieces beside it, and a hole in a zone to stay in is a polygon to keep out
-of. They are the zones themselves, without the margin: the agent keeps farther away, and the fence
-is the last line.
+Which polygons a zone is, swarm.model.fence_rings tells. They are the zones themselves, without the
+margin: the agent keeps farther away, and the fence is the last line.
 
 Protocol: https://mavlink.io/en/services/mission.html#geofence
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from agent.vehicle.messages import AltitudeFrame, MissionItem, MissionKind
 from swarm.model import Zone
+from swarm.model.fence_rings import fence_rings
 from swarm.model.frames import Origin, wgs84_from_enu
-
-if TYPE_CHECKING:
-    import shapely
 
 _INCLUSION, _EXCLUSION = 5001, 5002
 """MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION and _EXCLUSION."""
 _DEG_E7 = 1e7
 _TOLERANCE_E7 = 2
 """Of places as told back [1e-7 deg]."""
-_LEAST_M2 = 1e-3
-"""Pieces smaller than that are none: they come of rounding where zones are cut."""
 
 Corner = tuple[int, int]
 """Latitude and longitude [1e-7 deg]."""
@@ -55,23 +47,14 @@ class FenceArea:
         )
 
 
-def blocks_all_heights(zone: Zone, low_m: float, high_m: float) -> bool:
-    """Whether a zone lies in the way at every height from ``low_m`` to ``high_m`` [m]."""
-    return zone.bottom_m <= low_m and zone.top_m >= high_m
-
-
 def fence_areas(zone: Zone, origin: Origin) -> tuple[FenceArea, ...]:
     """The polygons that a zone is, whatever its heights."""
-    if zone.inclusive:
-        rings = [(_INCLUSION, zone.polygon_enu_m)]
-        rings += [(_EXCLUSION, hole) for hole in zone.holes_enu_m]
-    elif zone.holes_enu_m:
-        rings = [(_EXCLUSION, _ring(piece)) for piece in _cut(zone.shape())]
-    else:
-        rings = [(_EXCLUSION, zone.polygon_enu_m)]
     return tuple(
-        FenceArea(command, tuple(_corner_e7(corner_m, origin) for corner_m in ring))
-        for command, ring in rings
+        FenceArea(
+            _INCLUSION if ring.inclusive else _EXCLUSION,
+            tuple(_corner_e7(corner_m, origin) for corner_m in ring.corners_enu_m),
+        )
+        for ring in fence_rings(zone)
     )
 
 
@@ -119,24 +102,3 @@ def _told_e7(item: MissionItem) -> Corner:
 def _corner_e7(place_enu_m: tuple[float, float], origin: Origin) -> Corner:
     lat_deg, lon_deg, _ = wgs84_from_enu(origin, (*place_enu_m, 0.0))
     return round(lat_deg * _DEG_E7), round(((lon_deg + 180.0) % 360.0 - 180.0) * _DEG_E7)
-
-
-def _ring(shape: shapely.Polygon) -> tuple[tuple[float, float], ...]:
-    """Its corners, each once."""
-    return tuple((east_m, north_m) for east_m, north_m in shape.exterior.coords[:-1])
-
-
-def _cut(shape: shapely.Polygon) -> Iterator[shapely.Polygon]:
-    """Pieces without holes that make up a polygon: cut north to south through each hole."""
-    import shapely
-
-    if not shape.interiors:
-        yield shape
-        return
-    west_m, south_m, east_m, north_m = shape.bounds
-    middle_m = shapely.Polygon(shape.interiors[0]).representative_point().x
-    for low_m, high_m in ((west_m, middle_m), (middle_m, east_m)):
-        half = shape.intersection(shapely.box(low_m, south_m, high_m, north_m))
-        for piece in shapely.get_parts(half):
-            if piece.area > _LEAST_M2:
-                yield from _cut(piece)

@@ -29,7 +29,6 @@ from agent.vehicle.conversation import Conversation
 from agent.vehicle.fence_items import (
     FenceArea,
     areas_of,
-    blocks_all_heights,
     fence_areas,
     fence_items,
 )
@@ -45,6 +44,7 @@ from agent.vehicle.mission_transfer import (
 )
 from agent.vehicle.parameter_reading import ParameterReading
 from swarm.model import Zone
+from swarm.model.fence_rings import blocks_all_heights
 from swarm.protocol.fields import Point
 
 if TYPE_CHECKING:

@@ -20,6 +20,7 @@ EXTRAS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
             "matplotlib",
             "mcap",
             "prometheus_client",
+            "pyproj",
             "scipy",
             "starlette",
             "uvicorn",

@@ -15,6 +15,8 @@ from swarm.scenario.keep_out import unsound_rings
 from swarm.scenario.places import POLYGON, entries, origin_of, outline_faults
 from swarm.survey.lines import Uncut, line_tasks
 
+_MOST_TASKS = 20_000
+"""Of a mission with areas: no plan is made for more."""
 _OF_CAMERAS = ("height_m", "sidelap_frac", "frontlap_frac")
 """What a camera needs beside it."""
 
@@ -67,6 +69,10 @@ def with_lines(mission: Mission) -> tuple[Mission, list[Finding]]:
             problem = f"its line {shown(named.id)} has the id of {places[named.id]}"
             findings.append(Finding(("area", index, "id"), problem, "give the area another id"))
             continue
+        if len(tasks) + len(lines) > _MOST_TASKS:
+            problem = f"its {len(lines)} lines make more than {_MOST_TASKS} tasks of the mission"
+            findings.append(Finding(("area", index), problem, "make several missions of it"))
+            break
         places |= {line.id: f"a line of area[{index}]" for line in lines}
         tasks += lines
         areas.append(replace(area, lines=len(lines)))

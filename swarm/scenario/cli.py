@@ -11,6 +11,7 @@ import typer
 
 if TYPE_CHECKING:
     from swarm.model import Origin
+    from swarm.scenario.draft import Draft
     from swarm.scenario.task_files import TaskFile
 
 NameOption = Annotated[
@@ -28,11 +29,12 @@ UavsOption = Annotated[
 
 
 def import_tasks(
-    file: Annotated[
-        Path,
+    files: Annotated[
+        list[Path],
         typer.Argument(
-            metavar="FILE",
-            help="File of tasks: .plan, .waypoints, .geojson or .csv.",
+            metavar="FILE…",
+            help="Files of tasks, areas and fences: .plan, .waypoints, .kml, .kmz, .geojson, .shp, "
+            ".zip of Shapefiles, .csv, .fen or .rally.",
             show_default=False,
         ),
     ],
@@ -84,7 +86,11 @@ def import_tasks(
     value: Annotated[
         float,
         typer.Option(
-            "--value", min=0.0, max=1e12, metavar="V", help="Of tasks the file gives none."
+            "--value",
+            min=0.0,
+            max=1e12,
+            metavar="V",
+            help="Of tasks the file gives none, and of every hectare of such areas.",
         ),
     ] = 1.0,
     service_s: Annotated[
@@ -97,9 +103,61 @@ def import_tasks(
             help="Time on the spot, for tasks the file gives none.",
         ),
     ] = 0.0,
+    spacing_m: Annotated[
+        float | None,
+        typer.Option(
+            "--spacing-m",
+            min=0.1,
+            max=1e6,
+            metavar="M",
+            help="Between the lines of areas the file says nothing of. Default: 25.",
+            show_default=False,
+        ),
+    ] = None,
+    camera: Annotated[
+        str | None,
+        typer.Option(
+            "--camera",
+            metavar="NAME",
+            help="What takes the pictures of such areas, instead of --spacing-m; needs a height.",
+            show_default=False,
+        ),
+    ] = None,
+    height_m: Annotated[
+        float | None,
+        typer.Option(
+            "--height-m",
+            min=-1e5,
+            max=1e5,
+            metavar="H",
+            help="Where lines of areas are flown, above home, if the file does not say it. "
+            "Default: each UAV in its layer.",
+            show_default=False,
+        ),
+    ] = None,
+    terrain: Annotated[
+        Path | None,
+        typer.Option(
+            "--terrain",
+            metavar="DEM",
+            help="What the ground is: a GeoTIFF or an SRTM tile. Heights above the ground are "
+            "refused without.",
+            show_default=False,
+        ),
+    ] = None,
+    clearance_m: Annotated[
+        float,
+        typer.Option(
+            "--clearance-m",
+            min=0.0,
+            max=1e4,
+            metavar="M",
+            help="How near UAVs may come to that ground.",
+        ),
+    ] = 20.0,
     name: NameOption = None,
     no_fence: Annotated[
-        bool, typer.Option("--no-fence", help="Leave the plan's geofence out.")
+        bool, typer.Option("--no-fence", help="Leave the geofence and other zones out.")
     ] = False,
     output: Annotated[
         Path | None,
@@ -112,39 +170,49 @@ def import_tasks(
         ),
     ] = None,
 ) -> int:
-    """Make a scenario of a plan's waypoints, or of GeoJSON or CSV.
+    """Make a scenario of what surveyors and ground stations have.
 
-    Reads QGroundControl plans and waypoint files, too. Every waypoint or point becomes a task,
-    also those within surveys and corridor scans; hold times become service times. Polygons of the
-    geofence become zones. Take-off, landing, cameras and the like are left out, and told. The
-    scenario is commented, to be looked over and flown.
+    Points and waypoints become tasks, lines tasks along them, polygons and surveys areas that are
+    covered by lines, geofences zones. Several files are put together, such as a mission and its
+    fence; the first one that names a home says where the UAVs start. What has been assumed or left
+    out is told. The scenario is commented, to be looked over and flown.
 
-    A CSV has columns lat_deg, lon_deg and maybe alt_m, or east_m, north_m and maybe up_m, and
-    any of id, value, service_s, kind, appears_s, due_s, opens_s and closes_s; GeoJSON has the
-    latter as properties.
+    KML, GeoJSON and Shapefiles may give each object id, value, service_s, kind, appears_s, due_s,
+    opens_s, closes_s and height_m; lines trigger_m, too; areas spacing_m and trigger_m or camera,
+    sidelap_frac, frontlap_frac, heading_deg and max_line_m, too. A polygon is a zone if it has a
+    property zone, or if its name or folder begins with zone, no-fly or keep-out. A CSV has columns
+    lat_deg, lon_deg and maybe alt_m, or east_m, north_m and maybe up_m, and those of tasks.
 
     Examples:
         swarm import survey.plan --uavs 3 -o survey.toml && swarm run survey.toml
-        swarm import mission.waypoints --uavs 5 --speed-m-s 8 --service-s 10 > mission.toml
-        swarm import trees.geojson --home 47.3977,8.5456,488 -o trees.toml
+        swarm import field.kml --home 47.3977,8.5456,488 --camera dji-mavic-3e --height-m 60
+        swarm import mission.waypoints fence.waypoints --speed-m-s 8 -o mission.toml
+        swarm import parcels.zip --home 47.3977,8.5456,488 --spacing-m 20 -o parcels.toml
         swarm import grid.csv --uavs 10 -o grid.toml
     """
     from dataclasses import replace
 
+    from swarm.scenario.area_defaults import AreaDefaults
     from swarm.scenario.draft import DraftOptions, draft_scenario
-    from swarm.scenario.task_files import read_task_file
+    from swarm.scenario.task_files import ImportOptions, read_task_files
 
-    tasks = read_task_file(file, home=None if home is None else _origin(home), below_m=below_m)
+    _require_height(camera, height_m, spacing_m)
+    place = None if home is None else _origin(home)
+    options = ImportOptions(place, below_m, has_terrain=terrain is not None)
+    tasks = read_task_files(files, options)
     if no_fence:
         tasks = replace(tasks, zones=())
-    named = _named(name, file)
-    fleet = DraftOptions(named, uavs, speed_m_s, horizon_s, value, service_s)
-    text = draft_scenario(tasks, fleet)
+    named = _named(name, files[0])
+    areas = AreaDefaults(spacing_m, camera, height_m)
+    folder = None if output is None else output.parent
+    ground = (terrain, clearance_m, folder)
+    fleet = DraftOptions(named, uavs, speed_m_s, horizon_s, value, service_s, areas, *ground)
+    draft = draft_scenario(tasks, fleet)
     if output is None:
-        print(text, end="")
+        print(draft.text, end="")
     else:
-        _write(output, text)
-    print(_story(tasks, fleet.uavs, output), file=sys.stderr)
+        _write(output, draft.text)
+    print(_story(tasks, draft, fleet.uavs, output), file=sys.stderr)
     return 0
 
 
@@ -241,13 +309,47 @@ def _write(path: Path, text: str, option: str = "--output") -> None:
         raise InputError(Fault(*where, problem, "name a file that can be")) from error
 
 
-def _story(tasks: TaskFile, uavs: int, output: Path | None) -> str:
-    """What has been made of the file, and how to go on."""
-    count = len(tasks.entries)
-    story = f"{tasks.source}: {count} task{'s'[: count - 1]} for {uavs} UAV{'s'[: uavs - 1]}"
-    if zones := len(tasks.zones):
-        story += f" and {zones} zone{'s'[: zones - 1]}"
+def _require_height(camera: str | None, height_m: float | None, spacing_m: float | None) -> None:
+    """Refuse a camera of which nobody knows how high it flies, or that has nothing to say."""
+    from swarm.runtime.errors import Fault, InputError
+    from swarm.survey.cameras import CAMERAS
+
+    if camera is None:
+        return
+    if camera not in CAMERAS:
+        from swarm.runtime.errors import remedy_for_name
+
+        problem, remedy = f"{camera!r} is no camera that is known", remedy_for_name(camera, CAMERAS)
+    elif spacing_m is not None:
+        problem, remedy = "says how far apart lines are, as --spacing-m does", "leave out one"
+    elif height_m is None or height_m <= 0.0:
+        problem, remedy = "needs to know how high it flies", "add --height-m, above 0"
+    else:
+        return
+    raise InputError(Fault("--camera", "", problem, remedy))
+
+
+def _story(tasks: TaskFile, draft: Draft, uavs: int, output: Path | None) -> str:
+    """What has been made of the files, and how to go on."""
+    counted = [
+        _counted(len(tasks.entries), "task"),
+        _counted(len(tasks.areas), "area") + f" of {_counted(draft.lines, 'line')}"
+        if tasks.areas
+        else "",
+    ]
+    made = " and ".join(words for words in counted if words)
+    story = f"{tasks.source}: {made} for {_counted(uavs, 'UAV')}"
+    if tasks.zones:
+        story += f" and {_counted(len(tasks.zones), 'zone')}"
     if tasks.left_out:
         parts = (f"{n} × {what}" if n > 1 else what for what, n in tasks.left_out.items())
         story += f"; left out: {', '.join(parts)}"
-    return story if output is None else f"{story}\nfly it with: swarm run {output}"
+    lines = [story, *(f"note: {note}" for note in draft.notes)]
+    if output is not None:
+        lines.append(f"fly it with: swarm run {output}")
+    return "\n".join(lines)
+
+
+def _counted(count: int, what: str) -> str:
+    """``3 tasks``; nothing where there is none."""
+    return f"{count} {what}{'s' if count > 1 else ''}" if count else ""

@@ -40,9 +40,7 @@ def decode(data: bytes, source: str, what: str) -> str:
     Raises:
         InputError: it is no such text, or larger than `LARGEST_FILE_BYTES`.
     """
-    if len(data) > LARGEST_FILE_BYTES:
-        problem = f"is larger than {LARGEST_FILE_BYTES // 2**20} MiB"
-        raise InputError(Fault(source, "", problem, f"give a smaller {what}"))
+    require_small(data, source, what)
     try:
         return data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
@@ -51,6 +49,17 @@ def decode(data: bytes, source: str, what: str) -> str:
         problem = f"byte 0x{data[error.start]:02x} is not UTF-8"
         place = f"line {line}, column {column}"
         raise InputError(Fault(source, place, problem, "save the file as UTF-8")) from error
+
+
+def require_small(data: bytes, source: str, what: str) -> None:
+    """Refuse a file that `read_bytes` has cut.
+
+    Raises:
+        InputError: it is larger than `LARGEST_FILE_BYTES`.
+    """
+    if len(data) > LARGEST_FILE_BYTES:
+        problem = f"is larger than {LARGEST_FILE_BYTES // 2**20} MiB"
+        raise InputError(Fault(source, "", problem, f"give a smaller {what}"))
 
 
 _PACKAGE = "sim.scenarios"

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator
-from dataclasses import asdict
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,6 +18,7 @@ from swarm.model import Mission
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.checks import check
 from swarm.scenario.conversion import mission_of
+from swarm.scenario.edition import edition_of
 from swarm.scenario.files import decode, read_bytes
 from swarm.scenario.findings import Document, Finding, faults_of, printable
 from swarm.scenario.places import origin_of
@@ -64,7 +65,7 @@ def parse_scenario(data: bytes, source: str, folder: Path = Path()) -> Mission:
     document = parse_toml(data, source, _WHAT)
     if "tasks_from" not in document:
         return build_mission(document, source)
-    from swarm.scenario.task_files import read_task_file
+    from swarm.scenario.task_files import ImportOptions, read_task_files
 
     document = {**document, "task": document.get("task", [])}
     name = document["tasks_from"]
@@ -73,28 +74,29 @@ def parse_scenario(data: bytes, source: str, folder: Path = Path()) -> Mission:
     origin = origin_of(document.get("origin"))
     if "origin" in document and origin is None:
         return build_mission(document, source)
-    return build_mission(document, source, read_task_file(folder / name, home=origin))
+    options = ImportOptions(
+        origin, visits_alone=edition_of(document) == 1, has_terrain="terrain" in document
+    )
+    tasks = read_task_files([folder / name], options)
+    return build_mission(document, source, replace(tasks, zones=()))
 
 
 def build_mission(document: Document, source: str, tasks: TaskFile | None = None) -> Mission:
     """The mission of a parsed scenario and of the ``tasks`` that come from elsewhere.
 
-    Tasks of a file follow those of the document and are worth 1 unless the file says
-    otherwise; its home is the origin where the document names none.
+    Tasks, areas and zones of a file follow those of the document; tasks and areas are worth 1
+    unless the file says otherwise. Its home is the origin where the document names none.
 
     Raises:
         InputError: with every fault of the document, then those of the tasks.
     """
     from swarm.scenario.shapes import validate
 
+    first: dict[str, int] = {}
+    if tasks is not None:
+        document, first = _with_entries(document, tasks)
     if document.get("area"):  # its lines are tasks enough
         document = {"task": [], **document}
-    own = document.get("task")
-    more = () if tasks is None else tasks.entries
-    if tasks is not None and isinstance(own, list):
-        document = {**document, "task": [*own, *({"value": 1.0, **e.table} for e in more)]}
-        if "origin" not in document and (home := tasks.home) is not None:
-            document["origin"] = asdict(home)
     scenario, findings = validate(document)
     findings += check(document)
     if scenario is not None and not findings:
@@ -105,7 +107,6 @@ def build_mission(document: Document, source: str, tasks: TaskFile | None = None
             mission, findings = with_lines(mission)
         if not findings:
             return mission
-    first = len(own) if isinstance(own, list) else 0
     here = [finding for finding in findings if not _from_file(finding, first)]
     faults = faults_of(document, source, here)
     if tasks is not None:
@@ -114,20 +115,41 @@ def build_mission(document: Document, source: str, tasks: TaskFile | None = None
     raise InputError(*faults)
 
 
-def _faults_of_file(tasks: TaskFile, findings: list[Finding], first: int) -> Iterator[Fault]:
-    """The findings at their places in the file of tasks, in its order."""
-    for finding in sorted(findings, key=lambda finding: int(finding.path[1])):
-        _, index, *key = finding.path
-        entry = tasks.entries[int(index) - first]
+def _with_entries(document: Document, tasks: TaskFile) -> tuple[Document, dict[str, int]]:
+    """``document`` with the entries of ``tasks``, and where these begin in its arrays."""
+    whole = dict(document)
+    first: dict[str, int] = {}
+    for array, entries, defaults in (
+        ("task", tasks.entries, {"value": 1.0}),
+        ("area", tasks.areas, {"value": 1.0}),
+        ("zone", tasks.zones, {}),
+    ):
+        own = document.get(array, [])
+        if entries and isinstance(own, list):
+            first[array] = len(own)
+            whole[array] = [*own, *({**defaults, **entry.table} for entry in entries)]
+    if "origin" not in whole and tasks.home is not None:
+        whole["origin"] = asdict(tasks.home)
+    return whole, first
+
+
+def _faults_of_file(
+    tasks: TaskFile, findings: list[Finding], first: Mapping[str, int]
+) -> Iterator[Fault]:
+    """The findings at their places in the files of tasks, in the order of these."""
+    entries = {"task": tasks.entries, "area": tasks.areas, "zone": tasks.zones}
+    for finding in sorted(findings, key=lambda each: (str(each.path[0]), int(each.path[1]))):
+        array, index, *key = finding.path
+        entry = entries[str(array)][int(index) - first[str(array)]]
         place = entry.at(str(key[0])) if key else entry.place
-        yield Fault(tasks.source, place, finding.problem, finding.remedy)
+        yield Fault(entry.source, place, finding.problem, finding.remedy)
 
 
-def _from_file(finding: Finding, first: int) -> bool:
-    """Whether it concerns a task that follows the ``first`` ones of the document."""
+def _from_file(finding: Finding, first: Mapping[str, int]) -> bool:
+    """Whether it concerns an entry that follows the ``first`` ones of its array."""
     match finding.path:
-        case ("task", int(index), *_):
-            return index >= first
+        case (str(array), int(index), *_):
+            return array in first and index >= first[array]
         case _:
             return False
 

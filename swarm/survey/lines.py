@@ -29,6 +29,8 @@ MOST_LINES = 5000
 """Of one area; as many tasks as the largest missions have."""
 MOST_CORNERS = 10_000
 """Of one area, holes included."""
+_TOO_RAGGED = 10
+"""If strips have so many times more pieces than lines may be, they are not cut at all."""
 _LEFT_FRAC = 0.001
 """Share of what is to be covered that may be left where zones leave no room."""
 _ROUNDS = 8
@@ -106,7 +108,12 @@ def lines_enu_m(area: Area, zones: Sequence[Zone], margin_m: float) -> FloatArra
     )
     if at_least > MOST_LINES:
         return _too_many(area, int(at_least))
+    about = _met_by_strips(polygons, axes(heading_deg), area.apart_m)
+    if about > _TOO_RAGGED * MOST_LINES:
+        return _too_many(area, int(about))
     middles_m = _middles_m(polygons, axes(heading_deg), area.apart_m)
+    if len(middles_m) > MOST_LINES:  # many strips are cut by a ragged border
+        return _too_many(area, len(middles_m))
     main_m = _clipped_m(middles_m, zones, margin_m)
     rest_m = _lines_of_rest_m(polygons, main_m, area.apart_m, zones, margin_m)
     lines_m = _in_equal_parts(np.round(np.concatenate([main_m, rest_m]), 3), longest_m)
@@ -134,6 +141,16 @@ def _extent_m(polygons: shapely.Geometry, turned: FloatArray) -> tuple[float, fl
 
     across_m = (shapely.get_coordinates(polygons) @ turned)[:, 1]
     return float(across_m.min()), float(across_m.max())
+
+
+def _met_by_strips(polygons: shapely.Geometry, turned: FloatArray, apart_m: float) -> float:
+    """About how many pieces strips have: every second edge that a strip meets begins one."""
+    import shapely
+
+    rings = shapely.get_parts(shapely.boundary(polygons))
+    corners_m, ring = shapely.get_coordinates(rings, return_index=True)
+    across_m = np.abs(np.diff((corners_m @ turned)[:, 1]))[np.diff(ring) == 0]
+    return float(across_m.sum()) / (2.0 * apart_m)
 
 
 def _middles_m(polygons: shapely.Geometry, turned: FloatArray, apart_m: float) -> FloatArray:

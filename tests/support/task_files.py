@@ -11,6 +11,7 @@ from swarm.scenario.task_files import ReadOptions, TaskFile
 from swarm.scenario.task_files.csv_file import read_csv
 from swarm.scenario.task_files.geojson_file import read_geojson
 from swarm.scenario.task_files.plan_file import read_plan
+from swarm.scenario.task_files.point_lists import read_fence, read_rally, read_text_file
 from swarm.scenario.task_files.waypoints_file import read_waypoints
 
 DATA = Path(__file__).parents[1] / "data" / "task_files"
@@ -20,7 +21,11 @@ READERS = {
     ".waypoints": read_waypoints,
     ".geojson": read_geojson,
     ".csv": read_csv,
+    ".fen": read_fence,
+    ".rally": read_rally,
+    ".txt": read_text_file,
 }
+"""Of files that are text."""
 
 
 def tables(file: TaskFile) -> list[Mapping[str, object]]:
@@ -42,5 +47,6 @@ def wp(identity: str, lat_deg: float, lon_deg: float, alt_m: float) -> dict[str,
 
 TERRAIN = (
     "its height is above the ground there, which the file does not know; "
-    "give heights above launch or above mean sea level"
+    "give heights above launch or above mean sea level, or name the ground: --terrain DEM, or "
+    "[terrain] in the scenario"
 )

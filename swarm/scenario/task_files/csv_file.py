@@ -16,7 +16,7 @@ from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.findings import printable, shown
 from swarm.scenario.task_files.task_file import (
     TASK_KEYS,
-    FileTask,
+    FileEntry,
     ReadOptions,
     TaskFile,
     gather,
@@ -89,7 +89,7 @@ def _check(header: Sequence[str], source: str, place: str) -> None:
 
 def _entry(
     place: str, header: Sequence[str], cells: Sequence[str], source: str
-) -> FileTask | Fault:
+) -> FileEntry | Fault:
     if len(cells) > len(header):
         problem = f"has {len(cells)} cells for {len(header)} columns"
         return Fault(source, place, problem, "put cells with a separator in them in quotes")
@@ -109,4 +109,4 @@ def _entry(
             return Fault(source, f"{place}, {name}", "is empty", "give a number such as 12.5")
     if in_metres:
         table["position_m"] = [table.pop(name) for name in _METRES if name in table]
-    return FileTask(table, place)
+    return FileEntry(table, place)

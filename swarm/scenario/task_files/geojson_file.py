@@ -1,83 +1,147 @@
-"""Points of GeoJSON (RFC 7946) as tasks.
+"""Points, lines and polygons of GeoJSON (RFC 7946) as tasks, areas and zones.
 
-Properties are id, value, service_s, kind, appears_s, due_s, opens_s and closes_s; their names may
-be in capitals. The third coordinate is the height above mean sea level. Leaves out: lines,
-polygons, and coordinates other than longitude and latitude.
+Properties have the names of a scenario's keys, in capitals or not. The third coordinate is the
+height above mean sea level, of polygons none is heeded. Leaves out: coordinates other than
+longitude and latitude.
 """
 
 from __future__ import annotations
 
-from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from swarm.runtime.errors import Fault, InputError
-from swarm.scenario.findings import number_of, printable, shown
+from swarm.scenario.findings import shown
+from swarm.scenario.task_files.features import Feature, FeatureReader, Form, Place, Shape, place_of
 from swarm.scenario.task_files.task_file import (
-    TASK_KEYS,
-    FileTask,
+    MOST_ENTRIES,
+    MOST_POINTS,
+    FileEntry,
     ReadOptions,
     TaskFile,
     gather,
     member,
     parse_object,
-    slip_of,
 )
 
-_WHAT = "a FeatureCollection of Points in GeoJSON"
+_WHAT = "a FeatureCollection of Points, LineStrings and Polygons in GeoJSON"
+_POSITION = "give [longitude, latitude] or [longitude, latitude, height]"
+_WGS84 = ("CRS84", "EPSG::4326", "EPSG:4326")
+"""How names of the one system of coordinates end, in files of before RFC 7946."""
+_SINGLE = {form.value: form for form in Form}
+_MULTI = {f"Multi{form.value}": form for form in Form}
+_DEPTH = {Form.POINT: 0, Form.LINE: 1, Form.POLYGON: 2}
+"""How deep positions are nested in coordinates."""
+_GIVE = "give Points, LineStrings or Polygons"
 
 
 def read_geojson(text: str, request: ReadOptions) -> TaskFile:
-    """The tasks of a feature collection.
+    """What is in a feature collection.
 
     Raises:
         InputError: with every fault of the file.
     """
     document = parse_object(text, request.source, _WHAT)
     features = document.get("features")
-    if document.get("type") != "FeatureCollection":
+    if document.get("type") == "Feature":
+        features = [document]
+    elif document.get("type") != "FeatureCollection":
         problem = f"{shown(document.get('type', 'nothing'))} is not 'FeatureCollection'"
         raise InputError(Fault(request.source, "type", problem, f"give {_WHAT}"))
     if not isinstance(features, list):
         raise InputError(Fault(request.source, "features", "is not an array", f"give {_WHAT}"))
-    left_out: Counter[str] = Counter()
-    found: list[FileTask | Fault] = []
+    _require_wgs84(document, request.source)
+    reader = FeatureReader(request.source)
+    found: list[FileEntry | Fault] = []
     for index, feature in enumerate(features):
-        properties = member(feature, "properties")
-        given = properties if isinstance(properties, Mapping) else {}
-        named = {str(name).strip().lower(): value for name, value in given.items()}
-        found.append(_entry(f"features[{index}]", feature, named, request.source))
-        left_out.update(f"property {printable(name)}" for name in named if name not in TASK_KEYS)
-    return gather(request, found, "add Points", home=request.home, left_out=left_out)
+        if len(found) > MOST_ENTRIES:
+            break
+        place = f"features[{index}]"
+        try:
+            shapes = list(_shapes(member(feature, "geometry"), f"{place}.geometry"))
+        except _Misshapen as error:
+            found.append(Fault(request.source, error.place, error.problem, error.remedy))
+            continue
+        found += reader.entries(_feature(feature, place, shapes))
+    nothing = "add Points, LineStrings or Polygons"
+    return gather(request, found, nothing, home=request.home, left_out=reader.left_out)
 
 
-def _entry(
-    place: str, feature: object, properties: Mapping[str, object], source: str
-) -> FileTask | Fault:
-    geometry = member(feature, "geometry", "type")
-    if geometry != "Point":
-        problem = f"{shown(geometry)} is not 'Point'" if geometry else "has no geometry"
-        return Fault(source, f"{place}.geometry", problem, "give Points alone")
-    coordinates = member(feature, "geometry", "coordinates")
-    given = coordinates if isinstance(coordinates, list) else []
-    numbers = [number for value in given if (number := number_of(value)) is not None]
-    if not 2 <= len(numbers) == len(given) <= 3:
-        remedy = "give [longitude, latitude] or [longitude, latitude, height]"
-        place = f"{place}.geometry.coordinates"
-        return Fault(source, place, "is not an array of 2 or 3 numbers", remedy)
-    table: dict[str, object] = {}
-    identity = properties.get("id", member(feature, "id"))
-    if isinstance(identity, int) and not isinstance(identity, bool):
-        identity = str(identity)  # as RFC 7946 allows
-    if isinstance(identity, str):
-        table["id"] = identity
-    elif identity is not None:
-        problem = f"{shown(identity)} is not an id"
-        return Fault(source, f"{place}, id", problem, "give a string or a whole number")
-    table |= dict(zip(("lon_deg", "lat_deg", "alt_m"), numbers, strict=False))
-    for name, value in properties.items():
-        if slip := slip_of(name, TASK_KEYS):
-            where = f"{place}.properties"
-            return Fault(source, where, f"{shown(name)} is unknown", f"did you mean {slip!r}?")
-        if name in TASK_KEYS and name != "id" and value is not None:
-            table[name] = value
-    return FileTask(table, place)
+def _feature(value: object, place: str, shapes: Sequence[Shape]) -> Feature:
+    properties = member(value, "properties")
+    given = properties if isinstance(properties, Mapping) else {}
+    named = {str(name).strip().lower(): each for name, each in given.items()}
+    name = named.get("name")
+    name = name if isinstance(name, str) else None
+    if named.get("id") is None and name is None:  # else it is a number that a program gave
+        named["id"] = member(value, "id")
+    return Feature(place, shapes, named, name)
+
+
+class _Misshapen(Exception):  # noqa: N818 - it is no error of ours
+    """A geometry is not as it should be."""
+
+    def __init__(self, place: str, problem: str, remedy: str) -> None:
+        super().__init__(problem)
+        self.place, self.problem, self.remedy = place, problem, remedy
+
+
+def _require_wgs84(document: Mapping[str, object], source: str) -> None:
+    name = member(document, "crs", "properties", "name")
+    if name is None or (isinstance(name, str) and name.endswith(_WGS84)):
+        return
+    problem = f"{shown(name)} is not longitude and latitude of WGS84"
+    remedy = "save the file in EPSG:4326, as RFC 7946 has it"
+    raise InputError(Fault(source, "crs", problem, remedy))
+
+
+def _shapes(geometry: object, place: str, *, inner: bool = False) -> Iterator[Shape]:
+    kind, coordinates = member(geometry, "type"), member(geometry, "coordinates")
+    where = f"{place}.coordinates"
+    if kind == "GeometryCollection" and not inner:
+        parts = member(geometry, "geometries")
+        for index, part in enumerate(parts if isinstance(parts, list) else ()):
+            yield from _shapes(part, f"{place}.geometries[{index}]", inner=True)
+    elif isinstance(kind, str) and (form := _SINGLE.get(kind)) is not None:
+        yield _shape(form, coordinates, where)
+    elif isinstance(kind, str) and (form := _MULTI.get(kind)) is not None:
+        for index, part in enumerate(_array(coordinates, where, form)):
+            yield _shape(form, part, f"{where}[{index}]")
+    else:
+        problem = f"{shown(kind)} is nothing to fly to" if kind else "has no geometry"
+        raise _Misshapen(place, problem, _GIVE)
+
+
+def _shape(form: Form, coordinates: object, place: str) -> Shape:
+    match form:
+        case Form.POINT:
+            rings = [[_position(coordinates, place)]]
+        case Form.LINE:
+            rings = [_positions(coordinates, place, form)]
+        case Form.POLYGON:
+            parts = _array(coordinates, place, form)
+            rings = [
+                _positions(ring, f"{place}[{index}]", form) for index, ring in enumerate(parts)
+            ]
+    return Shape(form, rings)
+
+
+def _array(value: object, place: str, form: Form) -> Sequence[object]:
+    if not isinstance(value, list) or not value:
+        nested = "[" * _DEPTH[form] + "…" + "]" * _DEPTH[form]
+        raise _Misshapen(place, "is not an array of coordinates", f"give {nested} of positions")
+    return value
+
+
+def _positions(value: object, place: str, form: Form) -> list[Place]:
+    positions = _array(value, place, form)
+    if len(positions) > MOST_POINTS:
+        problem = f"has {len(positions)} points"
+        raise _Misshapen(place, problem, f"simplify it to {MOST_POINTS} or fewer")
+    return [_position(each, f"{place}[{index}]") for index, each in enumerate(positions)]
+
+
+def _position(value: object, place: str) -> Place:
+    position = place_of(value) if isinstance(value, list) else None
+    if position is None:
+        raise _Misshapen(place, "is not an array of 2 or 3 numbers", _POSITION)
+    return position

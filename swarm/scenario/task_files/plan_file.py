@@ -1,30 +1,44 @@
-"""QGroundControl's plans (``.plan``): waypoints, and those that surveys and scans contain.
+"""QGroundControl's plans (``.plan``): waypoints, surveys, scans and the geofence.
 
 Format: https://docs.qgroundcontrol.com/master/en/qgc-dev-guide/file_formats/plan.html.
-Of a complex item the mission items that QGroundControl has stored with it are
-taken; without them, the corners of its transects. Polygons of the geofence are zones. Its
-circles, rally points, and what a vehicle does on the way (cameras, regions of interest) are left
-out.
+Surveys and scans become areas and lines (swarm.scenario.task_files.survey_patterns). Of other
+complex items the mission items that QGroundControl has stored with them are taken; without them,
+the corners of their transects. Rally points and what a vehicle does on the way (regions of
+interest, gimbals) are left out.
+
+A plan that Peckorder has exported says which of its waypoints are tasks and which lead round zones
+(coordinator.export writes it); saved by QGroundControl it says so no more.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 from swarm.model import Origin
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.findings import number_of, shown
+from swarm.scenario.task_files.exported_tasks import exported_tasks
+from swarm.scenario.task_files.fences import circle_zone, polygon_zone
 from swarm.scenario.task_files.mission_items import (
     BELOW_M,
+    Heights,
     MavCommand,
     MavFrame,
     WaypointItem,
     left_out_of,
-    stops_of,
+    tasks_of,
     whole_of,
 )
-from swarm.scenario.task_files.task_file import ReadOptions, TaskFile, gather, member, parse_object
+from swarm.scenario.task_files.survey_patterns import TRANSECTS, PatternReader
+from swarm.scenario.task_files.task_file import (
+    FileEntry,
+    ReadOptions,
+    TaskFile,
+    gather,
+    member,
+    parse_object,
+)
 
 LAYER_KEY = "peckorder"
 """Top-level key under which an exported plan keeps its height layer, for the way back."""
@@ -32,12 +46,11 @@ LAYER_KEY = "peckorder"
 _WHAT = "a plan saved by QGroundControl"
 _HOME = "mission.plannedHomePosition"
 _LANDINGS = ("fwLandingPattern", "vtolLandingPattern")
-_TRANSECTS = "TransectStyleComplexItem"
 _FIXED_WING = 1
 
 
 def read_plan(text: str, request: ReadOptions) -> TaskFile:
-    """The tasks of a plan.
+    """What is in a plan.
 
     Raises:
         InputError: with every fault of the plan.
@@ -45,54 +58,95 @@ def read_plan(text: str, request: ReadOptions) -> TaskFile:
     document = parse_object(text, request.source, _WHAT)
     mission = _mission(document, request.source)
     home = request.home or _home(mission)
+    ours = member(document, LAYER_KEY)
     below_m = request.below_m
     if below_m is None:
-        layer_m = number_of(member(document, LAYER_KEY, "layer_m"))
+        layer_m = number_of(member(ours, "layer_m"))
         below_m = BELOW_M if layer_m is None else layer_m
-    items: list[WaypointItem] = []
-    faults: list[Fault] = []
-    landings: Counter[str] = Counter()
-    for place, value in _numbered("mission.items", mission["items"]):
-        if member(value, "complexItemType") in _LANDINGS:
-            landings["landing pattern"] += 1
-            continue
-        for item in _items(place, value, request.source):
-            if isinstance(item, WaypointItem):
-                items.append(item)
-            else:
-                faults.append(item)
-    zones, unfenced = _fence(document)
     homeless = Fault(
         request.source,
         _HOME,
         "is no place with a height, and heights are counted from it",
         "give the home in QGroundControl, or --home LAT,LON,ALT, or [origin] in the scenario",
     )
+    heights = Heights(home, below_m, homeless, request.has_terrain)
+    patterns = PatternReader(request.source, heights)
+    reading = _PlanItems(request, heights, patterns)
+    for place, value in _numbered("mission.items", mission["items"]):
+        reading.take(place, value)
+    tasks = None if request.visits_alone else exported_tasks(ours, reading.items, heights)
+    found = [*reading.found, *reading.visits()] if tasks is None else [*reading.found, *tasks]
+    zones, unfenced = _fence(document, request.source)
+    rally = Counter("rally point" for _ in _numbered("", member(document, "rallyPoints", "points")))
     return gather(
         request,
-        [*faults, *stops_of(items, home, below_m, homeless)],
+        [*found, *zones],
         "add waypoints or a survey in QGroundControl",
         home=home,
         speed_m_s=_speed_m_s(mission),
         below_m=below_m,
-        left_out=left_out_of(items) + landings + unfenced,
-        zones=zones,
+        left_out=left_out_of(reading.items, visits_alone=request.visits_alone)
+        + reading.left_out
+        + patterns.left_out
+        + unfenced
+        + rally,
+        notes=patterns.notes,
     )
 
 
-def _fence(document: Mapping[str, object]) -> tuple[list[Mapping[str, object]], Counter[str]]:
-    """Polygons of the geofence as zones, and how much of the rest of it there is."""
-    zones: list[Mapping[str, object]] = []
+class _PlanItems:
+    """Sorts the entries of ``items`` into what is flown to and what is covered."""
+
+    def __init__(self, request: ReadOptions, heights: Heights, patterns: PatternReader) -> None:
+        self.items: list[WaypointItem] = []
+        """All that are waypoints, or tell something of them."""
+        self.found: list[FileEntry | Fault] = []
+        self.left_out: Counter[str] = Counter()
+        self._request, self._heights, self._patterns = request, heights, patterns
+
+    def take(self, place: str, value: object) -> None:
+        """One entry more."""
+        if member(value, "complexItemType") in _LANDINGS:
+            self.left_out["landing pattern"] += 1
+            return
+        entries = None
+        if member(value, "type") == "ComplexItem" and not self._request.visits_alone:
+            entries = self._patterns.entries(place, value)
+        if entries is not None:
+            self.found += entries
+            return
+        for item in _items(place, value, self._request.source):
+            if isinstance(item, WaypointItem):
+                self.items.append(item)
+            else:
+                self.found.append(item)
+
+    def visits(self) -> Sequence[FileEntry | Fault]:
+        """Tasks of the waypoints."""
+        return tasks_of(self.items, self._heights, visits_alone=self._request.visits_alone)
+
+
+def _fence(
+    document: Mapping[str, object], source: str
+) -> tuple[list[FileEntry | Fault], Counter[str]]:
+    """Polygons and circles of the geofence as zones, and how much of the rest of it there is."""
+    zones: list[FileEntry | Fault] = []
     rest: Counter[str] = Counter()
     fence = document.get("geoFence")
-    for _, value in _numbered("", member(fence, "polygons")):
+    for place, value in _numbered("geoFence.polygons", member(fence, "polygons")):
         corners, inclusion = member(value, "polygon"), member(value, "inclusion")
         if not isinstance(corners, list) or not isinstance(inclusion, bool):
             rest["geofence polygon"] += 1
             continue
-        zone: dict[str, object] = {"id": f"fence{len(zones) + 1}", "polygon": corners}
-        zones.append(zone | ({"inclusive": True} if inclusion else {}))
-    rest.update("geofence circle" for _ in _numbered("", member(fence, "circles")))
+        zones.append(polygon_zone(corners, source, place, inclusive=inclusion))
+    for place, value in _numbered("geoFence.circles", member(fence, "circles")):
+        center, radius = member(value, "circle", "center"), member(value, "circle", "radius")
+        inclusion = member(value, "inclusion")
+        if not isinstance(inclusion, bool) or not number_of(radius):
+            rest["geofence circle"] += 1
+            continue
+        zones.append(circle_zone(center, radius, source, place, inclusive=inclusion))
+    rest.update("geofence return point" for _ in [0] if member(fence, "breachReturn"))
     return zones, rest
 
 
@@ -171,16 +225,16 @@ def _simple(place: str, value: object, source: str) -> WaypointItem | Fault:
 
 
 def _complex(place: str, value: object, source: str) -> Iterator[WaypointItem | Fault]:
-    stored = member(value, _TRANSECTS, "Items")
-    corners = member(value, _TRANSECTS, "VisualTransectPoints")
+    stored = member(value, TRANSECTS, "Items")
+    corners = member(value, TRANSECTS, "VisualTransectPoints")
     if isinstance(stored, list) and stored:
-        for inner, item in _numbered(f"{place}.{_TRANSECTS}.Items", stored):
+        for inner, item in _numbered(f"{place}.{TRANSECTS}.Items", stored):
             yield _simple(inner, item, source)
     elif isinstance(corners, list) and corners:
-        camera = member(value, _TRANSECTS, "CameraCalc")
+        camera = member(value, TRANSECTS, "CameraCalc")
         frame = _camera_frame(camera)
         height_m = member(camera, "DistanceToSurface")
-        for inner, corner in _numbered(f"{place}.{_TRANSECTS}.VisualTransectPoints", corners):
+        for inner, corner in _numbered(f"{place}.{TRANSECTS}.VisualTransectPoints", corners):
             pair = corner[:2] if isinstance(corner, list) and len(corner) >= 2 else [None, None]
             params = [0.0, 0.0, 0.0, None, *pair, height_m]
             yield WaypointItem(MavCommand.WAYPOINT, frame, params, inner)

@@ -13,10 +13,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from coordinator.export import ExportFirmware, uav_plan, write_plans
+from coordinator.export import ExportFirmware, sortie_plan, write_plans
 from coordinator.planner.plan import make_plan
+from coordinator.sorties import Leg, Sortie, SortieItems
 from swarm.cli import main
-from swarm.model import Mission, Origin, Plan, Task, TaskId, Uav, UavId
+from swarm.model import Mission, Origin, Plan, Task, TaskId, Uav, UavId, Zone
 from swarm.model.frames import enu_from_wgs84
 from swarm.model.layers import FlightLayers
 from swarm.runtime.clock import SystemClock
@@ -37,8 +38,13 @@ SHARED = [("type", str), ("frame", int), ("command", int), ("autoContinue", bool
 """What QGroundControl asks of every simple item."""
 
 
-def exported(route: tuple[Task, ...] = TASKS, uav: Uav = UAV, layer_m: float = 13.0) -> Any:
-    return json.loads(json.dumps(uav_plan(uav, route, ORIGIN, layer_m, ExportFirmware.PX4)))
+def exported(
+    *legs: Leg, zones: tuple[Zone, ...] = (), firmware: ExportFirmware = ExportFirmware.PX4
+) -> Any:
+    start = UAV.position_enu_m
+    sortie = Sortie(start, legs or [Leg(task) for task in TASKS], start)
+    items = SortieItems(sortie, UAV, 13.0, ORIGIN)
+    return json.loads(json.dumps(sortie_plan(items, zones, firmware)))
 
 
 def mission(**changes: object) -> Mission:
@@ -84,7 +90,7 @@ def test_plan_takes_off_visits_the_tasks_and_returns_in_the_layer_of_its_uav() -
 
 
 def test_ardupilot_is_told_from_px4() -> None:
-    found: Any = uav_plan(UAV, TASKS, ORIGIN, 10.0, ExportFirmware.ARDUPILOT)
+    found = exported(firmware=ExportFirmware.ARDUPILOT)
 
     assert found["mission"]["firmwareType"] == 3
 
@@ -101,12 +107,14 @@ def test_every_uav_with_tasks_gets_a_file_and_an_older_one_of_an_idle_uav_goes(
     split = replace(planned(both), routes={UavId("u1"): (A,), UavId("u2"): (B,)})
     alone = replace(split, routes={UavId("u1"): (A, B), UavId("u2"): ()})
 
-    assert write_plans(folder, both, split, ExportFirmware.PX4) == [
+    assert write_plans(folder, both, split, ExportFirmware.PX4).files == [
         folder / "m.u1.plan",
         folder / "m.u2.plan",
     ]
     (folder / "of somebody else.plan").touch()
-    assert write_plans(folder, both, alone, ExportFirmware.PX4) == [folder / "m.u1.plan"]
+    (folder / "m.u2.sortie2.plan").touch()
+    written = write_plans(folder, both, alone, ExportFirmware.PX4)
+    assert written.files == [folder / "m.u1.plan"]
     assert sorted(path.name for path in folder.iterdir()) == ["m.u1.plan", "of somebody else.plan"]
 
 
@@ -130,7 +138,7 @@ def scenarios(draw: st.DrawFn) -> Mission:
         horizon_s=5000.0,
         uavs=tuple(Uav(UavId(f"u{n}"), point, 10.0) for n, point in enumerate(uavs)),
         tasks=tuple(
-            Task(TaskId(f"t{n}"), point, 1.0, service_s=draw(st.floats(0.0, 900.0)))
+            Task(TaskId(f"task-{n}"), point, 1.0, service_s=draw(st.floats(0.0, 900.0)))
             for n, point in enumerate(draw(st.lists(points, min_size=1, max_size=8)))
         ),
         origin=draw(
@@ -152,7 +160,7 @@ def test_exported_lists_come_back_as_the_same_places(
 
     written = write_plans(folder, what, made, ExportFirmware.ARDUPILOT)
 
-    assert len(written) == sum(1 for route in made.routes.values() if route)
+    assert len(written.files) == sum(1 for route in made.routes.values() if route)
     for uav, route in made.routes.items():
         if not route:
             continue
@@ -164,6 +172,7 @@ def test_exported_lists_come_back_as_the_same_places(
             place = enu_from_wgs84(origin, table["lat_deg"], table["lon_deg"], table["alt_m"])
             np.testing.assert_allclose(place, tasks[task].position_enu_m, rtol=0.0, atol=0.01)
             assert table.get("service_s", 0.0) == tasks[task].service_s
+            assert table["id"] == task
 
 
 def plan(*arguments: str) -> int:

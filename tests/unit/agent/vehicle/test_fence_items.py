@@ -11,13 +11,13 @@ import shapely
 from agent.vehicle.fence_items import (
     FenceArea,
     areas_of,
-    blocks_all_heights,
     fence_areas,
     fence_items,
 )
 from agent.vehicle.firmware.fences import arducopter_fence, px4_fence
 from agent.vehicle.messages import MissionKind
 from swarm.model import Zone, ZoneId
+from swarm.model.fence_rings import blocks_all_heights
 from swarm.model.frames import enu_from_wgs84
 from tests.support.bridge_flight import ORIGIN
 

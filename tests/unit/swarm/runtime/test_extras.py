@@ -18,6 +18,7 @@ from swarm.runtime.extras import EXTRAS, MissingExtraError, missing_extra, requi
 
 ROOT = Path(__file__).parents[4]
 PROJECT: dict[str, Any] = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+DATA = ROOT / "tests" / "data" / "task_files"
 OWN = {"swarm", "agent", "coordinator", "sim"}
 MODULES = {"eclipse_zenoh": "zenoh", "pyserial": "serial"}
 """Packages whose module has another name."""
@@ -34,7 +35,7 @@ BASE = """
 """
 """What works without any extra; of every other command the help does."""
 
-LACKING = """
+LACKING = f"""
     ground  swarm dashboard        : dashboard --check
     ground  swarm replay           : replay nothing.mcap
     ground  swarm explain          : explain nothing.mcap --task t1
@@ -45,6 +46,7 @@ LACKING = """
     ground  --dashboard            : run table-1 --dashboard 0
     ground  --dashboard            : coordinator table-1 --dashboard 0
     ground  --plot                 : plan table-1 --plot lists.png
+    ground  swarm import           : import {DATA}/parcels.zip --home 47,8,400
     ground  swarm study            : study table-1
     ground  swarm reproduce        : reproduce
     bench   --methods ortools      : bench plan --methods ortools

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tomllib
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -12,6 +13,7 @@ from swarm.cli import main
 from swarm.model import Mission, Origin
 from swarm.model.frames import wgs84_from_enu
 from swarm.scenario import load_scenario, parse_scenario
+from swarm.survey.cameras import CAMERAS
 
 DATA = Path(__file__).parents[3] / "data" / "task_files"
 COMMANDS = {"import": EntryPoint("import", "swarm.scenario.cli:import_tasks", "peckorder.commands")}
@@ -41,15 +43,17 @@ def test_plan_becomes_a_scenario_of_a_fleet_at_its_home(tmp_path: Path) -> None:
         (10.0, 0.0, 0.0),
     ]
     assert {uav.speed_m_s for uav in mission.uavs} == {6.0}
-    assert len(mission.tasks) == 5
-    assert mission.tasks[0].service_s == 12.5
+    (area,) = mission.areas
+    assert len(mission.tasks) == 3 + area.lines
+    assert next(task.service_s for task in mission.tasks if task.id == "t1") == 12.5
 
 
 def test_places_keep_all_their_digits(capsys: pytest.CaptureFixture[str]) -> None:
     mission = imported(capsys, str(DATA / "orchard.plan"))
     assert mission.origin is not None
 
-    place = wgs84_from_enu(mission.origin, mission.tasks[0].position_enu_m)
+    (first,) = (task for task in mission.tasks if task.id == "t1")
+    place = wgs84_from_enu(mission.origin, first.position_enu_m)
 
     assert place == pytest.approx((47.001, 8.001, 440.0), abs=1e-12)
 
@@ -62,8 +66,10 @@ def test_story_goes_to_standard_error(tmp_path: Path, capsys: pytest.CaptureFixt
     captured = capsys.readouterr()
     assert captured.out == ""
     assert captured.err == (
-        f"{source}: 5 tasks for 3 UAVs; left out: takeoff, change speed, command 195, "
-        f"2 × command 206, return to launch\nfly it with: swarm run {path}\n"
+        f"{source}: 3 tasks and 1 area of 4 lines for 3 UAVs; left out: takeoff, change speed, "
+        "command 195, return to launch\n"
+        "note: areas without a value are worth 1 for every hectare (--value)\n"
+        f"fly it with: swarm run {path}\n"
     )
 
 
@@ -157,6 +163,21 @@ def test_scenario_that_is_there_is_not_overwritten(
             ),
         ),
         (
+            ["--camera", "dji-mavic-3"],
+            (
+                "--camera: 'dji-mavic-3' is no camera that is known; "
+                "did you mean 'dji-mavic-3e'? Choose one of "
+            ),
+        ),
+        (
+            ["--camera", "dji-mavic-3e"],
+            "--camera: needs to know how high it flies; add --height-m, above 0",
+        ),
+        (
+            ["--camera", "dji-mavic-3e", "--height-m", "60", "--spacing-m", "20"],
+            "--camera: says how far apart lines are, as --spacing-m does; leave out one",
+        ),
+        (
             ["--name", "a b"],
             (
                 "--name: 'a b' is not an id; give 1 to 64 letters, digits, '_', '-' or '.', "
@@ -178,7 +199,67 @@ def test_wrong_option_is_one_line_and_status_2(
     assert run(str(DATA / "grid.csv"), *arguments) == 2
 
     captured = capsys.readouterr()
-    assert (captured.out, captured.err) == ("", f"{line}\n")
+    assert captured.out == ""
+    (told,) = captured.err.splitlines()
+    assert told == line or (line.endswith("one of ") and told.startswith(line))
+
+
+def test_areas_that_say_nothing_of_it_get_a_spacing_that_is_told(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    fields, home = str(DATA / "fields-qgis.geojson"), ("--home", "47,8,400")
+
+    assert run(fields, *home) == 0
+    captured = capsys.readouterr()
+    mission = parse_scenario(captured.out.encode(), "out.toml")
+    assert [area.spacing_m for area in mission.areas] == [20.0, 25.0, 25.0]
+    assert [area.value for area in mission.areas] == [8.58, 12.5, 12.5]
+    assert (
+        "note: Sudacker-1, Sudacker-2: lines 25 m apart are a guess; --spacing-m M, or "
+        "--camera NAME with --height-m H, says better\n"
+        "note: areas without a value are worth 1 for every hectare (--value)\n"
+    ) in captured.err
+
+    assert run(fields, *home, "--spacing-m", "30") == 0
+    captured = capsys.readouterr()
+    mission = parse_scenario(captured.out.encode(), "out.toml")
+    assert [area.spacing_m for area in mission.areas] == [20.0, 30.0, 30.0]
+    assert "guess" not in captured.err
+
+
+def test_a_camera_and_its_height_serve_areas_that_name_none(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    camera = ("--camera", "dji-mavic-3e", "--height-m", "60")
+    mission = imported(capsys, str(DATA / "fields-qgis.geojson"), "--home", "47,8,400", *camera)
+
+    first, second, _ = mission.areas
+    assert (first.spacing_m, first.camera, first.height_m) == (20.0, None, 60.0)
+    assert second.camera == CAMERAS["dji-mavic-3e"]
+    assert (second.height_m, second.sidelap_frac, second.frontlap_frac) == (60.0, 0.7, 0.8)
+
+
+def test_the_camera_of_a_plan_is_written_by_its_numbers(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    assert run(str(DATA / "quarry.plan")) == 0
+
+    out = capsys.readouterr().out
+    assert "image_width_px = 5456, image_height_px = 3632 }" in out
+    (area,) = parse_scenario(out.encode(), "out.toml").areas
+    assert area.camera is not None
+    assert area.camera.sensor_width_mm == 23.2
+
+
+def test_the_horizon_leaves_time_to_fly_along_lines(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    path = tmp_path / "l.geojson"
+    line = {"type": "LineString", "coordinates": [[8.0, 47.0], [8.0, 47.09]]}
+    path.write_text(json.dumps({"type": "Feature", "geometry": line, "properties": {}}))
+
+    horizon_s = imported(capsys, str(path), "--home", "47,8,400", "--speed-m-s", "10").horizon_s
+    assert 1000.0 < horizon_s <= 1020.0  # 10 km
 
 
 def test_wrong_task_is_one_line_and_status_2(

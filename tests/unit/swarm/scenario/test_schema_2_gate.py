@@ -18,7 +18,6 @@ ALL = (
     "wind_m_s, [[base]], [[zone]] and band_m"
 )
 COMMANDS: dict[str, list[str]] = {
-    "swarm plan --export": ["plan", "FILE", "--export", "plans"],
     "swarm bench": ["bench", "plan", "FILE"],
 }
 

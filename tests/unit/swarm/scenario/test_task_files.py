@@ -14,7 +14,13 @@ from hypothesis import strategies as st
 
 from swarm.model import Origin
 from swarm.runtime.errors import InputError
-from swarm.scenario.task_files import SUFFIXES, ReadOptions, read_task_file
+from swarm.scenario.task_files import (
+    SUFFIXES,
+    ImportOptions,
+    ReadOptions,
+    read_task_file,
+    read_task_files,
+)
 from swarm.scenario.task_files.csv_file import read_csv
 from swarm.scenario.task_files.geojson_file import read_geojson
 from swarm.scenario.task_files.waypoints_file import read_waypoints
@@ -33,20 +39,28 @@ def test_plan_gives_waypoints_home_speed_and_what_is_left_out() -> None:
         {**wp("t1", 47.001, 8.001, 440.0), "service_s": 12.5},
         wp("t2", 47.002, 8.001, 460.0),
         {**wp("t3", 47.002, 8.002, 445.0), "service_s": 30.0},
-        wp("t4", 47.003, 8.001, 450.0),
-        wp("t5", 47.004, 8.001, 450.0),
     ]
-    assert [entry.place for entry in found.entries][2:4] == [
-        "mission.items[4]",
-        "mission.items[6].TransectStyleComplexItem.Items[0]",
-    ]
+    assert found.entries[2].place == "mission.items[4]"
+    (survey,) = found.areas
+    assert (survey.place, survey.table["id"]) == ("mission.items[6]", "survey1")
     assert found.left_out == {
         "takeoff": 1,
         "change speed": 1,
         "command 195": 1,
-        "command 206": 2,
         "return to launch": 1,
     }
+
+
+def test_survey_is_visits_of_its_corners_where_schema_1_asks_for_visits() -> None:
+    found = read_task_files([DATA / "orchard.plan"], ImportOptions(visits_alone=True))
+
+    assert found.areas == ()
+    assert tables(found)[3:] == [
+        wp("t4", 47.003, 8.001, 450.0),
+        wp("t5", 47.004, 8.001, 450.0),
+    ]
+    assert found.entries[3].place == "mission.items[6].TransectStyleComplexItem.Items[0]"
+    assert found.left_out["set cam trigg dist"] == 2
 
 
 def test_home_that_is_given_counts_instead_of_the_plans() -> None:
@@ -54,7 +68,7 @@ def test_home_that_is_given_counts_instead_of_the_plans() -> None:
 
     assert found.home == Origin(47.0, 8.0, 100.0)
     # What is above mean sea level stays there.
-    assert [entry.table["alt_m"] for entry in found.entries] == [150.0, 470.0, 455.0, 160.0, 160.0]
+    assert [entry.table["alt_m"] for entry in found.entries] == [150.0, 470.0, 455.0]
 
 
 def test_waypoint_file_has_its_home_in_the_first_row() -> None:
@@ -177,7 +191,8 @@ def point(coordinates: object = (8.0, 47.0), **properties: object) -> dict[str, 
     return {"type": "Feature", "geometry": geometry, "properties": properties}
 
 
-COLLECTION = "give a FeatureCollection of Points in GeoJSON"
+COLLECTION = "give a FeatureCollection of Points, LineStrings and Polygons in GeoJSON"
+GIVE_SHAPES = "give Points, LineStrings or Polygons"
 COORDINATES = (
     "f: features[0].geometry.coordinates: is not an array of 2 or 3 numbers; "
     "give [longitude, latitude] or [longitude, latitude, height]"
@@ -189,15 +204,15 @@ COORDINATES = (
     [
         ("3", f"f: is not a JSON object; {COLLECTION}"),
         (
-            json.dumps(point()),
-            f"f: type: 'Feature' is not 'FeatureCollection'; {COLLECTION}",
+            json.dumps(point()["geometry"]),
+            f"f: type: 'Point' is not 'FeatureCollection'; {COLLECTION}",
         ),
         ('{"type": "FeatureCollection"}', f"f: features: is not an array; {COLLECTION}"),
-        (geojson(), "f: holds no task; add Points"),
-        (geojson({}), "f: features[0].geometry: has no geometry; give Points alone"),
+        (geojson(), "f: holds no task; add Points, LineStrings or Polygons"),
+        (geojson({}), f"f: features[0].geometry: has no geometry; {GIVE_SHAPES}"),
         (
-            geojson({"geometry": {"type": "LineString"}}),
-            "f: features[0].geometry: 'LineString' is not 'Point'; give Points alone",
+            geojson({"geometry": {"type": "Circle"}}),
+            f"f: features[0].geometry: 'Circle' is nothing to fly to; {GIVE_SHAPES}",
         ),
         (geojson(point([8.0])), COORDINATES),
         (geojson(point([8.0, "47"])), COORDINATES),
@@ -294,8 +309,8 @@ def test_cell_may_have_lines_of_its_own() -> None:
 
 
 def test_suffix_says_what_a_file_is(tmp_path: Path) -> None:
-    assert SUFFIXES == (".plan", ".waypoints", ".geojson", ".csv")
-    for name, problem in (("a.kml", ".kml"), ("a", "a name without a suffix")):
+    assert {*READERS} < {*SUFFIXES}
+    for name, problem in (("a.gpx", ".gpx"), ("a", "a name without a suffix")):
         with pytest.raises(InputError) as caught:
             read_task_file(tmp_path / name)
         expected = (
@@ -346,7 +361,9 @@ def places_in(value: object, path: tuple[str | int, ...] = ()) -> list[tuple[str
 
 
 @settings(deadline=None)
-@pytest.mark.parametrize("name", ["orchard.plan", "trees.geojson"])
+@pytest.mark.parametrize(
+    "name", ["orchard.plan", "quarry.plan", "trees.geojson", "farm-geojson-io.geojson"]
+)
 @given(data=st.data())
 def test_any_damage_to_a_json_file_gives_tasks_or_faults(name: str, data: st.DataObject) -> None:
     document = json.loads((DATA / name).read_text())
@@ -366,7 +383,9 @@ def test_any_damage_to_a_json_file_gives_tasks_or_faults(name: str, data: st.Dat
 
 
 @pytest.mark.parametrize("wrong", [[], {}, None, True, -1, 1e308, 10**400, ""])
-@pytest.mark.parametrize("name", ["orchard.plan", "trees.geojson"])
+@pytest.mark.parametrize(
+    "name", ["orchard.plan", "quarry.plan", "trees.geojson", "farm-geojson-io.geojson"]
+)
 def test_a_wrong_kind_of_value_anywhere_gives_tasks_or_faults(name: str, wrong: object) -> None:
     document = json.loads((DATA / name).read_text())
     for *above, last in places_in(document)[1:]:
@@ -380,7 +399,7 @@ def test_a_wrong_kind_of_value_anywhere_gives_tasks_or_faults(name: str, wrong: 
 
 
 @settings(deadline=None)
-@pytest.mark.parametrize("suffix", SUFFIXES)
+@pytest.mark.parametrize("suffix", READERS)
 @given(data=st.data())
 def test_any_text_gives_tasks_or_faults(suffix: str, data: st.DataObject) -> None:
     alphabet = st.sampled_from('\t\n\r",; 0123456789.-eE{}[]:qQWPLGC_deglatonstmrh\0é')
