@@ -252,6 +252,7 @@ def agent(
             ready_by_itself=ready_by_itself,
             zones=tuple(spec.zone() for spec in brief.zones),
             zone_margin_m=brief.zone_margin_m,
+            terrain=None if brief.terrain is None else brief.terrain.terrain(),
             fence_radius_m=fence_radius_m,
             fence_height_m=fence_height_m,
         ).for_speedup(speedup)

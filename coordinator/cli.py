@@ -122,12 +122,12 @@ def plan(
     from coordinator.planner.options import BOUND_S, after_time, first_of, whole_limit
     from coordinator.planner.plan import make_plan
     from coordinator.planner.plan_report import plan_as_json, plan_table
-    from swarm.model.layers import FlightLayers
+    from swarm.model.layers import layers_over
     from swarm.scenario import load_scenario
 
     check_plan_options(method, plot, firmware, None if bound else bound_s)
     mission = load_scenario(scenario)
-    if (warning := height_warning(mission, FlightLayers())) is not None:
+    if (warning := height_warning(mission, layers_over(mission.terrain))) is not None:
         print(f"warning: {warning}", file=sys.stderr)
     if export is not None:
         from coordinator.export import require_exportable, require_origin

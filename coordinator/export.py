@@ -21,7 +21,7 @@ from coordinator.sorties import SortieItems, sorties_of
 from swarm.model import Mission, Origin, Plan, Zone, ZoneId
 from swarm.model.fence_rings import blocks_all_heights, fence_rings
 from swarm.model.frames import wgs84_from_enu
-from swarm.model.layers import FlightLayers
+from swarm.model.layers import layers_over
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.task_files.plan_file import LAYER_KEY
 
@@ -102,7 +102,7 @@ def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: ExportFirm
     """
     origin = require_origin(mission, mission.name)
     folder.mkdir(parents=True, exist_ok=True)
-    layers = FlightLayers()
+    layers = layers_over(mission.terrain)
     written: list[Path] = []
     unfenced: dict[ZoneId, None] = {}
     for index, uav in enumerate(mission.uavs):

@@ -73,6 +73,8 @@ class DecisionTurn:
     """Base at which it stands ready, with a full battery; None: it is in the air."""
     parked: bool = False
     """Whether it stands there beside the slots."""
+    flown_m: float | None = None
+    """Height at which it hovers out of its layer over the ground [m]; None: it does not."""
     blocking: Mapping[str, str] = field(default_factory=dict)
     """Lost UAV -> base on whose slot it stands; see `swarm.protocol.bases.blocking`."""
 
@@ -351,6 +353,7 @@ class ChoiceReporter(AgentPart):
         return ChoiceBasis(
             decided_s=turn.decided_s,
             place_enu_m=turn.place_enu_m,
+            flown_m=turn.flown_m,
             patience_s=turn.patience_s,
             credible=tuple(sorted(uav for uav in turn.credible if uav in claimants)),
             awaited=tuple(sorted(turn.awaited)),

@@ -295,7 +295,7 @@ def _stand_here(
     if problem.network is not None:
         at_m = problem.network.node_enu_m[node]
         if turn.place_enu_m[:2] != (at_m[0], at_m[1]):
-            state.first_s[row] = problem.legs_from_s(row, turn.place_enu_m)
+            state.first_s[row] = problem.legs_from_s(row, turn.place_enu_m, turn.flown_m)
             return
     state.first_s[row] = problem.leg_s[problem.kind[row], node]
 

@@ -26,7 +26,7 @@ from agent.core.states import (
     Trigger,
 )
 from agent.core.tasking import Tasking
-from agent.core.time_limits import WITHOUT_AIM, TimeLimits, ends_of
+from agent.core.time_limits import WITHOUT_AIM, TimeLimits
 from swarm.allocation import field
 from swarm.protocol.board import RuleMaker, ranks, rule_of
 from swarm.protocol.messages import PlanEpoch, TaskEntry
@@ -349,7 +349,7 @@ class FieldTasking(Tasking):
         if claim is None:
             return
         begins_s = max(mission_s, task.opens_s)
-        self._flights.reached(ends_of(task, backwards=bool(claim.reversed))[0], task)
+        self._flights.reached(self._flights.points(task, backwards=bool(claim.reversed))[0], task)
         self._attempt.too_late_at_s = None
         if begins_s > self._limits.latest_begin_s(task, claim) + TOLERANCE_S:
             self._release("came too late", now_s)
@@ -377,7 +377,7 @@ class FieldTasking(Tasking):
         claim = self.claim
         if claim is None or not task.path_enu_m or self._attempt.served_at_s is not None:
             return
-        self._flights.reached(ends_of(task, backwards=bool(claim.reversed))[1], task)
+        self._flights.reached(self._flights.points(task, backwards=bool(claim.reversed))[-1], task)
         self._attempt.served_at_s = now_s + task.service_s
 
     def _give_up_what_is_late(self, now_s: float) -> None:

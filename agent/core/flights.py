@@ -7,7 +7,9 @@ decisions are made, so a UAV flies what it reckoned with. Leaves out: why it fli
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +24,9 @@ from swarm.protocol.field_messages import BaseSpec, ZoneSpec
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import TaskEntry
 from swarm.protocol.operator_commands import zones_in_force
+
+if TYPE_CHECKING:
+    from swarm.allocation.legs.ground import Ground
 
 _AT_BASE_M = 25.0
 """Who is no farther from a base, or from its own spot there, is at it: agent.vehicle.standing."""
@@ -87,13 +92,16 @@ class Flights(AgentPart):
             self._spots, self._spots_of = {}, brief
         if base.id not in self._spots:
             fleet = [uav.id for uav in brief.uavs]
-            self._spots[base.id] = self._verticals.spot(
+            spot = self._verticals.spot(
                 base.position_enu_m,
                 fleet.index(self._uav) if self._uav in fleet else 0,
                 [uav.position_enu_m for uav in brief.uavs],
                 [zone.zone() for zone in brief.zones],
                 brief.zone_margin_m,
             )
+            if self.ground is not None:
+                spot = _over(self.ground, [spot], None)[0]
+            self._spots[base.id] = spot
         return self._spots[base.id]
 
     def base_here(self) -> BaseSpec | None:
@@ -127,6 +135,25 @@ class Flights(AgentPart):
         if problem is None or problem.network is None:
             return 0.0
         return float(problem.network.climb_s[self._row(problem)])
+
+    @property
+    def ground(self) -> Ground | None:
+        """The ground of the brief; None: nobody looks at it."""
+        brief = self._replica.brief
+        if brief is None or brief.terrain is None:
+            return None
+        from swarm.allocation.legs.ground import ground_of
+
+        return ground_of(brief.terrain.terrain())
+
+    def points(self, task: TaskEntry, *, backwards: bool) -> tuple[Point, ...]:
+        """A task from its beginning to its end in that direction, as heights are given."""
+        points, ground = task.path_enu_m or (task.position_enu_m,), self.ground
+        if ground is not None:
+            points = _over(ground, points, task.height_m)
+        elif task.height_m is not None:
+            points = tuple((east, north, task.height_m) for east, north, _ in points)
+        return points[::-1] if backwards else points
 
     def reached(self, place_enu_m: Point, task: TaskEntry) -> None:
         """The vehicle is at one end of a task, in its layer or at the height that it asks for."""
@@ -175,9 +202,10 @@ class Flights(AgentPart):
         problem, place_enu_m = self.problem, self._mission_view.place_enu_m
         if problem is None or place_enu_m is None:
             return None
-        if self._home_from != (place_enu_m, problem):
-            way = self._widened(field.way_home(problem, self._row(problem), place_enu_m))
-            self._home_from = place_enu_m, problem
+        flown_m = self._mission_view.flown_m
+        if self._home_from != (place_enu_m, flown_m, problem):
+            way = self._widened(field.way_home(problem, self._row(problem), place_enu_m, flown_m))
+            self._home_from = place_enu_m, flown_m, problem
             self._home = (
                 None
                 if way is None
@@ -199,7 +227,8 @@ class Flights(AgentPart):
         problem, place_enu_m = self.problem, self._mission_view.place_enu_m
         if problem is None or place_enu_m is None:
             return None
-        way = self._widened(field.way_to(problem, self._row(problem), place_enu_m, node))
+        row, flown_m = self._row(problem), self._mission_view.flown_m
+        way = self._widened(field.way_to(problem, row, place_enu_m, node, flown_m))
         if way is None or not self._mission_view.stands:
             return way
         climb_s = self.climb_s
@@ -222,9 +251,22 @@ class Flights(AgentPart):
             margin_m = brief.zone_margin_m
             self._clearance = PathClearance(zones, margin_m, self._clearance_m)
             self._clearance_of = problem
-        begin_enu_m = self._mission_view.in_layer(self._standing_m(place_enu_m))
+        begin_enu_m = self._standing_m(place_enu_m)
+        if self._mission_view.flown_m is None:
+            begin_enu_m = self._mission_view.in_layer(begin_enu_m)
         points = self._clearance.widened((begin_enu_m, *way.via_enu_m, way.end_enu_m))
-        return replace(way, via_enu_m=points[1:-1])
+        return replace(way, via_enu_m=self._over_ground(points, way.node)[1:-1])
+
+    def _over_ground(self, points: tuple[Point, ...], node: int) -> tuple[Point, ...]:
+        """A way that was led otherwise than it was planned, at the heights that it now takes."""
+        ground, problem = self.ground, self.problem
+        if ground is None or problem is None or problem.network is None:
+            return points
+        out_of_layer = self._mission_view.flown_m is not None
+        rooms_m = problem.network.rooms_m(self._row(problem), node, out_of_layer=out_of_layer)
+        flat_m = np.array(points)[:, :2]
+        path_m = ground.over_m(flat_m, (points[0][2], points[-1][2]), rooms_m)
+        return tuple((east, north, up) for east, north, up in path_m.tolist())
 
     def _standing_m(self, place_enu_m: Point) -> Point:
         """Where it really is whose place is reckoned to be a base's."""
@@ -272,7 +314,7 @@ class Flights(AgentPart):
 
     def along_line(self, task: TaskEntry, attempt: int, *, backwards: bool) -> Point:
         """Fly the line of a task from end to end; gives where that is, without the layer."""
-        points = task.path_enu_m[::-1] if backwards else task.path_enu_m
+        points = self.points(task, backwards=backwards)
         flown = [self._flown(task, point) for point in points]
         self.leg += 1
         line_s = self.line_s(task.task, backwards=backwards)
@@ -309,17 +351,26 @@ class Flights(AgentPart):
         return float(rest_to_rest_s(length_m, speed_m_s, acceleration_m_s2)[0])
 
     def _flown(self, task: TaskEntry, point: Point) -> Point:
-        if task.height_m is not None:
-            return point[0], point[1], task.height_m
-        return self._mission_view.in_layer(point)
+        return point if task.height_m is not None else self._mission_view.in_layer(point)
 
     def stop(self) -> None:
         """Hover where the vehicle is; in a zone, by the shortest way out of it."""
-        telemetry = self._mission_view.telemetry
-        if telemetry is not None:
-            self.leg += 1
-            self.meter.depart(self.leg)
-            self._order(GoTo(self.leg, self.way_out() or telemetry.position_enu_m))
+        telemetry, ground = self._mission_view.telemetry, self.ground
+        if telemetry is None:
+            return
+        here = telemetry.position_enu_m
+        there = self.way_out() or here
+        via_enu_m: tuple[Point, ...] = ()
+        if ground is not None and there[:2] != here[:2]:
+            room_m = ground.terrain.planned_m
+            east, north, up = _over(ground, [there], room_m)[0]
+            there = east, north, max(up, there[2])
+            flat_m = np.array([here[:2], there[:2]])
+            path_m = ground.over_m(flat_m, (here[2], there[2]), (room_m, room_m))
+            via_enu_m = tuple((east, north, up) for east, north, up in path_m[1:-1].tolist())
+        self.leg += 1
+        self.meter.depart(self.leg)
+        self._order(GoTo(self.leg, there, via_enu_m=via_enu_m))
 
     def swap(self, base: BaseSpec) -> None:
         """Land at a base, and get another battery."""
@@ -340,6 +391,12 @@ class Flights(AgentPart):
         above_enu_m = self._mission_view.in_layer(self.spot(base))
         reason = f"its battery is used up, and no slot of base {base.id} is free"
         self._order(Return(reason, resume, via_enu_m=above_enu_m, land=True))
+
+
+def _over(ground: Ground, points: Sequence[Point], height_m: float | None) -> tuple[Point, ...]:
+    from swarm.allocation.field.network import points_over  # plain missions start sooner without
+
+    return points_over(ground, points, height_m)
 
 
 def _distance(near: tuple[float, BaseSpec]) -> float:

@@ -181,6 +181,17 @@ class MissionView:
         return point[0], point[1], point[2] + self._layer_m
 
     @property
+    def flown_m(self) -> float | None:
+        """Height at which it hovers out of its layer over the ground of the brief [m].
+
+        None: in its layer, or nobody looks at the ground.
+        """
+        brief, place_enu_m = self._replica.brief, self.place_enu_m
+        if brief is None or brief.terrain is None or place_enu_m is None:
+            return None
+        return place_enu_m[2] if self._out_of_layer and not self.stands else None
+
+    @property
     def _layer_m(self) -> float:
         me = self.me
         return 0.0 if me is None else me.layer_m

@@ -321,6 +321,7 @@ class Tasking(AgentPart, ABC):
             awaited=self._peers.awaited(self._replica, now_s),
             patience_s=self._timing.patience_s,
             excluded=self._refused.left_alone(now_s).keys(),
+            flown_m=self._mission_view.flown_m,
         )
 
     def _rule_of(self, epoch: PlanEpoch) -> Rule | None:

@@ -14,21 +14,11 @@ from agent.core.energy import TOLERANCE_S, SortieClock
 from agent.core.flights import Flights, HomeFlight
 from agent.core.states import PAUSED_BY_OPERATOR, AgentState
 from swarm.allocation import field
-from swarm.protocol.fields import Point
 from swarm.protocol.messages import TaskEntry
 from swarm.protocol.uav_messages import Claim
 
 WITHOUT_AIM: Final = PAUSED_BY_OPERATOR | {AgentState.IDLE}
 """In the air, it stands by nothing there: its way home is all that its battery is for."""
-
-
-def ends_of(task: TaskEntry, *, backwards: bool) -> tuple[Point, Point]:
-    """Where a task begins and ends in that direction, as heights are given; a place twice."""
-    points = task.path_enu_m[::-1] if backwards else task.path_enu_m
-    first, last = (points[0], points[-1]) if points else (task.position_enu_m, task.position_enu_m)
-    if task.height_m is None:
-        return first, last
-    return (*first[:2], task.height_m), (*last[:2], task.height_m)
 
 
 class TimeLimits(AgentPart):

@@ -12,6 +12,7 @@ from typing import ClassVar
 from agent.vehicle.commands import CommandPolicy
 from swarm.model import Zone
 from swarm.model.frames import Origin
+from swarm.model.terrain import Terrain
 from swarm.protocol.fields import Point
 from swarm.runtime.errors import Fault, InputError
 
@@ -115,6 +116,8 @@ class BridgeConfig:
     zones: tuple[Zone, ...] = ()
     """Where not to fly, as long as no `KeepOut` says anything else."""
     zone_margin_m: float = 0.0
+    terrain: Terrain | None = None
+    """The ground that no path comes closer to than its clearance; None: it is not known."""
     """Distance to keep from them [m]."""
     ready_by_itself: bool = False
     """Whether a vehicle that has landed for another battery starts again without anybody's word:

@@ -44,6 +44,8 @@ class FlightPath:
         self._acceleration_m_s2 = acceleration_m_s2
         self._guard = guard
         self._aim = 0
+        self._passing: list[Point] = []
+        """Corners turned away from before they were passed: they count until they are."""
 
     @property
     def aim_enu_m(self) -> Point:
@@ -64,17 +66,21 @@ class FlightPath:
             reached_m: a corner that near is reached, however it is flown [m].
         """
         before = self._aim
+        self._passing = [
+            corner for corner in self._passing if _is_ahead(corner, place_enu_m, velocity_enu_m_s)
+        ]
         while not self.is_last:
             near = math.dist(place_enu_m, self.aim_enu_m) <= reached_m
             if not near and not self._bends_well(place_enu_m, velocity_enu_m_s, before):
                 break
+            self._passing.append(self.aim_enu_m)
             self._aim += 1
         return self._aim > before
 
     def _bends_well(self, place: Point, velocity: Point, first: int) -> bool:
         """Whether turning to the corner after the aim leaves out none by more than is allowed."""
         bend = self._bend(place, velocity, self._points[first], self._points[self._aim + 1])
-        skipped = self._points[first : self._aim + 1]
+        skipped = (*self._passing, self.aim_enu_m)
         cut_m = max(_distance_m(corner, bend) for corner in skipped)
         if cut_m > self._corner_m:
             return False
@@ -103,6 +109,10 @@ class FlightPath:
 def _plus(point: Point, direction: Sequence[float], times: float) -> Point:
     east, north, up = direction
     return point[0] + times * east, point[1] + times * north, point[2] + times * up
+
+
+def _is_ahead(corner: Point, place: Point, velocity: Point) -> bool:
+    return sum(v * (c - p) for v, c, p in zip(velocity, corner, place, strict=True)) > 0.0
 
 
 def _distance_m(point: Point, line: Sequence[Point]) -> float:

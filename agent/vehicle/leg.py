@@ -217,8 +217,8 @@ class PathLeg(RepositionLeg):
         *,
         insists: bool = True,
     ) -> None:
-        config, acceleration_m_s2 = session.config, session.acceleration_m_s2
-        self._path = FlightPath(path_enu_m, config.corner_m, acceleration_m_s2, session.guard)
+        acceleration_m_s2 = session.acceleration_m_s2
+        self._path = FlightPath(path_enu_m, session.corner_m, acceleration_m_s2, session.guard)
         self._speed_m_s = speed_m_s
         super().__init__(session, firmware, self._path.aim_enu_m, speed_m_s, insists=insists)
 

@@ -60,6 +60,10 @@ POLL_S = 0.25
 
 _PLACES = 2
 
+_OVER_GROUND_M = 0.75
+"""How far corners may be cut where the ground is known [m]. Where they are near each other bends
+run together, and what is flown is 2 m beside its path."""
+
 _ACCELERATION_M_S2 = 2.5
 """Of a vehicle of which neither mission nor parameters tell it: ArduCopter's own."""
 
@@ -97,7 +101,7 @@ class VehicleSession(Conversation):
         """How it flies by its parameters, as was told last."""
         self.absurd_parameters: set[str] = set()
         """Names of those whose values nobody would believe."""
-        self.guard = ZoneGuard(config.zones, config.zone_margin_m)
+        self.guard = ZoneGuard(config.zones, config.zone_margin_m, config.terrain)
         """Where not to fly."""
         self._zones: Sequence[Zone] = config.zones
         self.launched_enu_m: Point | None = None
@@ -109,6 +113,12 @@ class VehicleSession(Conversation):
         """Where the vehicle is, by its newest position [m; mission origin]."""
         self.sent_to_enu_m: deque[Point] = deque(maxlen=_PLACES)
         """Where the vehicle was last told to fly: of the newest it may not have heard."""
+
+    @property
+    def corner_m(self) -> float:
+        """How far corners may be cut; over the ground heights are, too [m]."""
+        corner_m = self.config.corner_m
+        return corner_m if self.config.terrain is None else min(corner_m, _OVER_GROUND_M)
 
     @property
     def acceleration_m_s2(self) -> float:
@@ -134,12 +144,12 @@ class VehicleSession(Conversation):
             return None
         place_enu_m = self.known_place_m()
         if place_enu_m is None:
-            return "where it is is not known, and zones are to be kept out of"
+            return "where it is is not known, and zones or the ground are to be kept away from"
         return self.guard.objection((place_enu_m, *way_enu_m))
 
     def keep_out(self, zones: Sequence[Zone], margin_m: float) -> None:
         """Heed these zones from now on, in place of those before."""
-        self._zones, self.guard = zones, ZoneGuard(zones, margin_m)
+        self._zones, self.guard = zones, ZoneGuard(zones, margin_m, self.config.terrain)
         if self.fence is not None:
             self.fence.keep_out(zones)
 

@@ -1,4 +1,4 @@
-"""Keeps one vehicle out of zones: no way through one is ever commanded.
+"""Keeps one vehicle out of zones and off the ground: no way through them is ever commanded.
 
 The last look before anything is said, by what the vehicle itself tells of its place; which way
 leads round is the agent's to say. Who is inside already may leave, on a short way. A vehicle
@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from swarm.model import Zone
+from swarm.model.terrain import Terrain
 from swarm.protocol.fields import Point
 
 if TYPE_CHECKING:
@@ -34,6 +35,9 @@ to them quite. Ways are led farther out where there is room (agent.core.path_cle
 _STEP_M = 0.5
 """Places are looked at that far apart on a way out."""
 
+_SAG_M = 0.5
+"""So much nearer to the ground a vehicle may come that is too near already."""
+
 _MORE_M, _MORE = 5.0, 1.5
 """A way out may be so many times as long as the shortest, and that much longer."""
 
@@ -44,9 +48,20 @@ class ZoneGuard:
     Args:
         zones: whatever their heights.
         margin_m: distance to keep from them [m].
+        terrain: the ground, with the distance to keep from it; None: it is not known.
     """
 
-    def __init__(self, zones: Sequence[Zone] = (), margin_m: float = 0.0) -> None:
+    def __init__(
+        self,
+        zones: Sequence[Zone] = (),
+        margin_m: float = 0.0,
+        terrain: Terrain | None = None,
+    ) -> None:
+        self._ground = None
+        if terrain is not None:
+            from swarm.allocation.legs.ground import ground_of
+
+            self._ground = ground_of(terrain)
         if zones:  # plain missions start sooner without
             from swarm.allocation.legs.obstacles import Obstacles
         near_m = max(0.0, margin_m - _ASIDE_M)
@@ -54,7 +69,7 @@ class ZoneGuard:
         self._margins = [(zone, Obstacles([zone], margin_m + _BEND_M)) for zone in zones]
 
     def __bool__(self) -> bool:
-        return bool(self._zones)
+        return bool(self._zones) or self._ground is not None
 
     def objection(self, path_enu_m: Sequence[Point]) -> str | None:
         """Why a vehicle must not fly that path, in words; None if it may.
@@ -70,10 +85,20 @@ class ZoneGuard:
                     continue
                 if number or not _leaves(obstacles, here, there):
                     return f"zone {zone.id} lies in the way"
+            if not self._above_ground(here, there, leaves=number == 0):
+                return "the ground lies in the way, or is nearer than clearance_m"
         return None
 
     def clear(self, path_enu_m: Sequence[Point]) -> bool:
-        """Whether no piece of that path meets a zone or its margin, nor comes near to it."""
+        """Whether no piece of that path meets a zone or its margin, nor comes near to it.
+
+        Nor to the ground, where it does not begin there.
+        """
+        if not all(
+            self._above_ground(here, there, leaves=number == 0)
+            for number, (here, there) in enumerate(pairwise(path_enu_m))
+        ):
+            return False
         if not self._zones:
             return True
         places_m = np.array([place[:2] for place in path_enu_m])
@@ -84,6 +109,22 @@ class ZoneGuard:
             for zone, obstacles in self._margins
             if zone.concerns(low_m, high_m)
         )
+
+    def _above_ground(self, here: Point, there: Point, *, leaves: bool) -> bool:
+        """Whether a straight piece keeps its distance from the ground.
+
+        On the way that ``leaves`` where it is, one that is nearer comes no nearer until it is far.
+        """
+        if self._ground is None:
+            return True
+        room_m = self._ground.terrain.clearance_m
+        begin_m = room_m
+        if leaves:
+            begin_m = min(room_m, here[2] - self._ground.one_up_m(*here[:2]) - _SAG_M)
+        flat_m, ends_up_m = np.array([here[:2], there[:2]]), (here[2], there[2])
+        if here[:2] == there[:2]:
+            return there[2] >= self._ground.one_up_m(*there[:2]) + room_m
+        return len(self._ground.over_m(flat_m, ends_up_m, (begin_m, room_m))) == 2
 
     def inside(self, place_enu_m: Point) -> bool:
         """Whether that place lies in a zone."""

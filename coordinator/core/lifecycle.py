@@ -14,7 +14,7 @@ from enum import Enum
 
 from coordinator.planner.online import EpochPolicy, ReplanResult, Situation
 from swarm.model import Mission, Plan, Uav, UavId
-from swarm.model.layers import FlightLayers
+from swarm.model.layers import layers_over
 from swarm.model.plan import by_reason
 from swarm.protocol.board import TaskBoard, TaskState, anything_doable, is_of_field, mission_of
 from swarm.protocol.calibration import FlightRates, flight_rates, noticeably_otherwise
@@ -326,7 +326,7 @@ class StartGate:
 def _in_layers(fleet: Sequence[Uav], brief: MissionConfig) -> tuple[Uav, ...]:
     """``fleet`` with its layers of the brief, where a planner would take it to fly in others."""
     told_m = {uav.id: uav.layer_m for uav in brief.uavs}
-    usual = FlightLayers()
+    usual = layers_over(None if brief.terrain is None else brief.terrain.terrain())
     return tuple(
         uav if told_m[uav.id] == usual.layer_m(row) else replace(uav, layer_m=told_m[uav.id])
         for row, uav in enumerate(fleet)

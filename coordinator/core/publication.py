@@ -17,11 +17,11 @@ from coordinator.mission_view.missed import able_alone
 from swarm.model import Mission, Origin, Task, Uav
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.model.ids import COORDINATOR
-from swarm.model.layers import FlightLayers
+from swarm.model.layers import FlightLayers, layers_over
 from swarm.protocol.board import TaskBoard, TaskState, is_of_field
 from swarm.protocol.encoding import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES, encode
 from swarm.protocol.events import LogLine, Publish
-from swarm.protocol.field_messages import AreaSpec, BaseSpec, ZoneSpec
+from swarm.protocol.field_messages import AreaSpec, BaseSpec, TerrainSpec, ZoneSpec
 from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.messages import (
     Body,
@@ -42,6 +42,7 @@ from swarm.protocol.timing import Timing
 def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> MissionConfig:
     """What the agents need to know of ``mission``."""
     origin: Origin = mission.origin or DEFAULT_ORIGIN
+    flown = layers_over(mission.terrain, layers)
     return MissionConfig(
         horizon_s=mission.horizon_s,
         success_default=mission.success_default,
@@ -57,7 +58,7 @@ def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> Missi
                 success=dict(uav.success),
                 survival=dict(uav.survival),
                 kind=uav.kind,
-                layer_m=layers.layer_m(index),
+                layer_m=flown.layer_m(index),
                 acceleration_m_s2=uav.acceleration_m_s2,
                 airspeed_m_s=uav.airspeed_m_s,
                 endurance_s=uav.endurance_s,
@@ -71,6 +72,7 @@ def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> Missi
         zone_margin_m=mission.zone_margin_m,
         band_m=mission.band_m,
         areas=tuple(map(AreaSpec.of, mission.areas)),
+        terrain=None if mission.terrain is None else TerrainSpec.of(mission.terrain),
     )
 
 
@@ -87,7 +89,7 @@ def unsayable(mission: Mission, layers: FlightLayers) -> list[str]:
     size = _longest(mission.name, mission_config_of(mission, layers, MAX_COUNT))
     if size > LARGE_LIMIT_BYTES:
         found.append(
-            f"fleet, bases, zones and areas take {size} bytes, and a message has room for "
+            f"fleet, bases, zones, areas and ground take {size} bytes, and a message has room for "
             f"{LARGE_LIMIT_BYTES}"
         )
     for number, task in enumerate(mission.tasks):

@@ -319,7 +319,11 @@ class MissionState:
                 layer_m, grounds = self._layer_and_grounds(writer)
                 self.flights.hear_status(writer, message.body, layer_m, grounds)
                 zones = zones_in_force(self.replica)
-                self.limits.hear(writer, message.body, layer_m, zones)
+                brief = self.replica.brief
+                terrain = (
+                    None if brief is None or brief.terrain is None else brief.terrain.terrain()
+                )
+                self.limits.hear(writer, message.body, layer_m, zones, terrain, grounds)
             return
         if isinstance(message.body, Choice):
             if self._reports.take_choice(writer, message.stamp, message.body):

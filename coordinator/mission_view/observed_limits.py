@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from swarm.model import Zone
+from swarm.model.terrain import Terrain
 from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.fields import FlatPoint, Point
 from swarm.protocol.uav_messages import Status, StatusPhase
@@ -24,6 +25,8 @@ _UNKNOWN_S = 5.0
 
 _SLOW_M_S = 1.0
 """Who is no faster flies in no direction that is worth knowing [m/s]."""
+_LANDING_M = 40.0
+"""Who is no farther from where it takes off and lands may do either."""
 _PIECES = 8
 """In which a curve is looked at."""
 
@@ -37,20 +40,40 @@ class ObservedLimits:
         self.nearest_zone_m: float | None = None
         """Least distance seen of a UAV from a zone that concerns its height [m], 0 inside; None
         until one was seen in a mission with zones."""
+        self.lowest_clearance_m: float | None = None
+        """Least height seen of a UAV above the ground away from where it takes off and lands [m];
+        None until one was seen in a mission with a terrain."""
         self.lowest_charge_frac: dict[str, float] = {}
         """By UAV, the least charge that it told while it took part."""
         self._last: dict[str, tuple[float, Point, Point | None]] = {}
         """By UAV, when and where it was last, and how fast [s mission time, m, m/s]."""
         self._shapes: dict[ZoneSpec, tuple[Zone, shapely.Polygon]] = {}
 
-    def hear(self, uav: str, status: Status, layer_m: float, zones: Sequence[ZoneSpec]) -> None:
-        """A UAV tells how it is, ``layer_m`` above the place it tells, with ``zones`` in force."""
+    def hear(
+        self,
+        uav: str,
+        status: Status,
+        layer_m: float,
+        zones: Sequence[ZoneSpec],
+        terrain: Terrain | None = None,
+        grounds: Sequence[Point] = (),
+    ) -> None:
+        """A UAV tells how it is.
+
+        Args:
+            uav: who.
+            status: what it tells.
+            layer_m: how much higher it is than the place that it tells.
+            zones: those in force.
+            terrain: the ground; None: nobody looks at it.
+            grounds: where it takes off and lands.
+        """
         if status.mission_s is None or status.phase in _GROUNDED:
             return
         if status.battery_frac is not None:
             lowest = self.lowest_charge_frac.get(uav, math.inf)
             self.lowest_charge_frac[uav] = min(lowest, status.battery_frac)
-        if status.position_enu_m is None or not zones:
+        if status.position_enu_m is None or not (zones or terrain):
             return
         east_m, north_m, up_m = status.position_enu_m
         place = east_m, north_m, up_m + layer_m
@@ -61,8 +84,34 @@ class ObservedLimits:
         self._last[uav] = now
         if now[0] - before[0] > _UNKNOWN_S:
             before = now
-        heights_m = sorted((before[1][2], place[2]))
-        self._look(_curve(*before[1:], *now[1:]), heights_m, zones)
+        flown_m = _curve(*before[1:], *now[1:])
+        if terrain is not None:
+            self._look_down(flown_m, (before[1][2], place[2]), terrain, grounds)
+        if zones:
+            self._look(flown_m, sorted((before[1][2], place[2])), zones)
+
+    def _look_down(
+        self,
+        places_m: Sequence[FlatPoint],
+        ends_up_m: tuple[float, float],
+        terrain: Terrain,
+        grounds: Sequence[Point],
+    ) -> None:
+        """How near to the ground a way comes that gains its height evenly."""
+        import numpy as np
+
+        from swarm.allocation.legs.ground import ground_of
+
+        flat_m = np.array(places_m)
+        up_m = np.linspace(*ends_up_m, len(flat_m)) - ground_of(terrain).up_m(flat_m)
+        away = [
+            all(math.dist(place, ground[:2]) > _LANDING_M for ground in grounds)
+            for place in places_m
+        ]
+        if any(away):
+            least_m = float(up_m[away].min())
+            lowest_m = self.lowest_clearance_m
+            self.lowest_clearance_m = least_m if lowest_m is None else min(lowest_m, least_m)
 
     def _look(
         self,

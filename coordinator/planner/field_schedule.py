@@ -73,8 +73,10 @@ def _entry(
         raise ValueError(f"{problem.uav_ids[uav]} has no way to {go}")
     places = [(east_m, north_m) for east_m, north_m in corners_m[:, :2].tolist()]
     depart_s, arrive_s, begin_s, end_s = times_s
+    flown_m = None if problem.network is None else problem.network.flown_between_m(uav, *nodes)
+    up_m = () if flown_m is None else tuple(flown_m[:, 2].tolist())
     return ScheduleEntry(
-        go, places[0], tuple(places[1:]), depart_s, arrive_s, begin_s, end_s, is_reversed
+        go, places[0], tuple(places[1:]), depart_s, arrive_s, begin_s, end_s, is_reversed, up_m
     )
 
 

@@ -84,6 +84,7 @@ def _entry_as_json(entry: ScheduleEntry) -> dict[str, object]:
         "begin_s": entry.begin_s,
         "end_s": entry.end_s,
         "reversed": entry.is_reversed,
+        **({"up_m": list(entry.up_m)} if entry.up_m else {}),
     }
 
 
@@ -103,6 +104,7 @@ def _schedule_from_json(
                 begin_s=entry["begin_s"],
                 end_s=entry["end_s"],
                 is_reversed=entry["reversed"],
+                up_m=tuple(entry.get("up_m", ())),
             )
             for entry in entries
         )

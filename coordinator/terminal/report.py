@@ -77,6 +77,9 @@ class MissionReport:
     """Least distance of two UAVs in the air [m]; None of a single one, or if it is not known."""
     nearest_zone_m: float | None = None
     """Least distance of a UAV in flight from a zone [m]; None without zones, or if not known."""
+    lowest_clearance_m: float | None = None
+    """Least height of a UAV above the ground between its take-offs and landings [m]; None without
+    [terrain], or if not known."""
     lowest_charge_frac: Mapping[str, float] = field(default_factory=dict)
     """By UAV, the least charge of its battery that was told while it took part."""
     left_out: Mapping[str, str] = field(default_factory=dict)
@@ -108,6 +111,7 @@ class MissionReport:
             "executed_schedule": schedule_as_json(self.executed_schedule),
             "closest_approach_m": self.closest_approach_m,
             "nearest_zone_m": self.nearest_zone_m,
+            "lowest_clearance_m": self.lowest_clearance_m,
             "lowest_charge_frac": dict(self.lowest_charge_frac),
             "done": list(result.done),
             "failed": list(result.failed),

@@ -17,6 +17,7 @@ from sim.world.wind import Wind, WindyMotion, gusts_of
 from swarm.model import Mission, UavId
 from swarm.model.frames import DEFAULT_ORIGIN, Origin
 from swarm.model.mission import PLAIN_CONSTRAINTS
+from swarm.model.terrain import Terrain
 
 _AIRSPEED_PER_CRUISE = 1.5
 _MAX_SYSTEM_ID = 254
@@ -113,6 +114,8 @@ class VehicleConfig:
     grounds_enu_m: tuple[Point, ...] = ()
     """Places where the height of the ground is known [m], which it has around them; none: that of
     the start everywhere."""
+    terrain: Terrain | None = None
+    """The ground all over, into which one can fly; None: it is where a place of known height is."""
     delays: Delays = Delays()
     spool_up_s: float = 1.0
     """From an accepted take-off to leaving the ground [s]; 3 to 4 on ArduCopter."""
@@ -277,6 +280,7 @@ def fleet_of(
             charge_frac=uav.charge_frac if given_s is None else 1.0,
             drains_in_flight=given_s is None and uav.endurance_s is not None,
             grounds_enu_m=(uav.position_enu_m, *(base.position_enu_m for base in bases)),
+            terrain=mission.terrain,
             bases=bases,
             swap_reboots=physics.swap_reboots,
             battery_failsafe=physics.battery_failsafe,

@@ -89,6 +89,7 @@ class FlightStateMachine:
         """Where the vehicle returns to and heights are counted from [m]."""
         self.motion = motion
         self._grounds_enu_m = config.grounds_enu_m or (config.start_enu_m,)
+        self._terrain = config.terrain
         self._descent_m_s = config.descent_m_s
         self._spool_up_s = config.spool_up_s
         self._takes_time = config.acceleration_m_s2 is not None
@@ -108,7 +109,11 @@ class FlightStateMachine:
         """It lands, and is as yet far from the ground."""
 
     def ground_up_m(self, east_m: float, north_m: float) -> float:
-        """Height of the ground at a place [m]: that of the nearest place of known height."""
+        """Height of the ground at a place [m]: by the terrain, or of the nearest place known."""
+        if self._terrain is not None:
+            from swarm.allocation.legs.ground import ground_of  # plain missions start sooner
+
+            return ground_of(self._terrain).one_up_m(east_m, north_m)
         here = east_m, north_m
         return min(self._grounds_enu_m, key=lambda ground: math.dist(ground[:2], here))[2]
 

@@ -18,6 +18,7 @@ from sim.autopilot.fence import FenceStore
 from sim.autopilot.fence_monitor import FenceMonitor
 from sim.autopilot.firmware.model import FirmwareModel
 from sim.autopilot.flight import FlightMode, FlightStateMachine, Milestone, MotionPhase
+from sim.autopilot.ground_contact import GroundContact
 from sim.autopilot.mission_item import StoredMissionItem
 from sim.autopilot.mission_run import MissionRun, MissionRunState
 from sim.autopilot.mission_store import MissionStore
@@ -87,6 +88,7 @@ class Pilot:
         self.failsafes = FailsafeMonitor(self)
         self.fence_store = fence_store
         self.fence = FenceMonitor(self, fence_store)
+        self._ground_contact = GroundContact(self)
         self.camera = CameraTrigger()
 
     # --- Time -------------------------------------------------------------------
@@ -115,6 +117,7 @@ class Pilot:
             self._disarm_s,
             self.failsafes.deadline_s(),
             self.fence.deadline_s(),
+            self._ground_contact.deadline_s(),
         )
 
     def _happen(self, what: int, at_s: float) -> None:
@@ -127,6 +130,7 @@ class Pilot:
             lambda at_s: self._disarm(at_s, self._disarm_occasion),
             self.failsafes.advance,
             self.fence.advance,
+            self._ground_contact.advance,
         )
         happenings[what](at_s)
 
@@ -142,8 +146,6 @@ class Pilot:
                 self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(at_s)))
                 self.set_home(self.position_enu_m(at_s), at_s, lock=False)
                 self.parameter_server.announce("MIS_TOTAL", float(max(1, len(self.store.items))))
-            case PowerUpStage.SENSORS | PowerUpStage.POSITION:
-                pass
         if (text := self.flavour.stage_texts.get(stage)) is not None:
             self.outbox.text(text.severity, text.template)
 
@@ -213,12 +215,10 @@ class Pilot:
         if mode is self.mode:
             return True
         if mode is FlightMode.AUTO and self._mission_unavailable(now_s):
-            on_ground = self.flight.on_ground
-            self.narrator.tell(
-                FirmwareEvent.MISSION_UNAVAILABLE_ON_GROUND
-                if on_ground
-                else FirmwareEvent.MISSION_UNAVAILABLE
-            )
+            unavailable = FirmwareEvent.MISSION_UNAVAILABLE
+            if self.flight.on_ground:
+                unavailable = FirmwareEvent.MISSION_UNAVAILABLE_ON_GROUND
+            self.narrator.tell(unavailable)
             return True  # acknowledged all the same
         refusal = self._mode_refusal(mode)
         if refusal is not None:
@@ -303,6 +303,7 @@ class Pilot:
         self.armed = True
         self.stands_since_s = None
         self.fence.armed(now_s)
+        self._ground_contact.armed(now_s)
         if not self.config.drains_in_flight:
             self.battery.start(now_s)
         self._disarm_unused(now_s)
@@ -351,6 +352,7 @@ class Pilot:
         self.battery.stop(now_s)
         self.failsafes.disarmed()
         self.fence.disarmed(now_s)
+        self._ground_contact.disarmed()
         self._auto_armed = False
         self.run.reset()
         self.flight.fall(now_s)
@@ -394,9 +396,9 @@ class Pilot:
                 self._take_off_up_m = None
             return accepted
         ready = self.armed and self.mode is FlightMode.GUIDED and self.flight.on_ground
-        if not ready or not self.readiness.has_position or up_m is None:
+        if not ready or not self.readiness.has_position:
             return False
-        if up_m <= self.position_enu_m(now_s)[2]:
+        if up_m is None or up_m <= self.position_enu_m(now_s)[2]:
             return False
         self.lift(up_m, now_s)
         return True
@@ -492,8 +494,8 @@ class Pilot:
             self.task_done = False
         if self.run.mission_changed(old, now_s):
             runs = self.run.state is MissionRunState.RUNNING
-            taken, in_vain = FirmwareEvent.MISSION_REPLACED, FirmwareEvent.MISSION_REPLACED_IN_VAIN
-            self.narrator.tell(taken if runs else in_vain)
+            in_vain = FirmwareEvent.MISSION_REPLACED_IN_VAIN
+            self.narrator.tell(FirmwareEvent.MISSION_REPLACED if runs else in_vain)
 
     def _boot_us(self, now_s: float) -> int:
         return round((now_s - self.readiness.boot_s) * 1e6)

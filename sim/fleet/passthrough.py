@@ -12,7 +12,7 @@ from agent.vehicle.signing import load_signing_key, signing_key_of
 from sim.autopilot.options import faults_by_uav
 from sim.fleet.autopilots import Autopilots, SimulatedAutopilots
 from swarm.model import Mission
-from swarm.model.layers import FlightLayers
+from swarm.model.layers import layers_over
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
 _RADIUS_FACTOR = 1.2
@@ -52,7 +52,7 @@ def fence_around(
     places += [task.position_enu_m for task in mission.tasks]
     farthest_m = max((math.hypot(east_m, north_m) for east_m, north_m, _ in places), default=0.0)
     heights_m = [up_m for _, _, up_m in places] or [0.0]
-    layer_m = FlightLayers().layer_m(max(0, len(mission.uavs) - 1))
+    layer_m = layers_over(mission.terrain).layer_m(max(0, len(mission.uavs) - 1))
     extent_m = max(max(heights_m) + layer_m, -min(heights_m))
     return Fence(
         radius_m or min(_RADIUS_FACTOR * farthest_m + _RADIUS_MARGIN_M, _MOST_RADIUS_M),

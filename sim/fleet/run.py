@@ -95,6 +95,7 @@ class RunResult:
             executed_schedule=flown.executed_schedule(),
             closest_approach_m=flown.flights.closest_approach_m,
             nearest_zone_m=flown.limits.nearest_zone_m,
+            lowest_clearance_m=flown.limits.lowest_clearance_m,
             lowest_charge_frac=flown.limits.lowest_charge_frac,
             left_out=flown.left_out,
             security=security,

@@ -22,7 +22,7 @@ from sim.fleet.run import fly
 from sim.fleet.security import security_of
 from sim.options import print_report
 from swarm.model import Mission
-from swarm.model.layers import FlightLayers
+from swarm.model.layers import layers_over
 from swarm.protocol.timing import Timing
 from swarm.runtime.errors import Fault, InputError
 
@@ -65,7 +65,9 @@ class ShownRun:
         """Say what a person should know before the start."""
         for line in () if options.dashboard is None else options.dashboard.lines:
             self._say(line)
-        if (warning := height_warning(self._mission, FlightLayers())) is not None:
+        if (
+            warning := height_warning(self._mission, layers_over(self._mission.terrain))
+        ) is not None:
             self._say(f"warning: {warning}")
 
     async def fly(self, options: LaunchOptions) -> int:

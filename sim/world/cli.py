@@ -136,6 +136,7 @@ def simulate(
             executed_schedule=flown.world.executed_schedule(),
             closest_approach_m=flown.world.closest_approach_m(),
             left_out=flown.world.mission_state.left_out,
+            lowest_clearance_m=flown.world.lowest_clearance_m(),
         )
         return print_report(told, json=json, report=report)
 
@@ -171,6 +172,7 @@ def _fly_with_faults(
         executed_schedule=verdict.world.executed_schedule(),
         closest_approach_m=verdict.world.closest_approach_m(),
         left_out=state.left_out,
+        lowest_clearance_m=verdict.world.lowest_clearance_m(),
     )
     return told, verdict.broken is not None
 

@@ -81,7 +81,8 @@ class FieldPaths:
 
     def _planned_s(self, row: int, planned_enu_m: FloatArray, flown_s: float) -> float:
         """Time of the leg with its round corners, of which the path has chords [s]."""
-        if self.mission.zone_margin_m == 0.0 or len(planned_enu_m) == 2:
+        chords = self.mission.zone_margin_m > 0.0 and len(planned_enu_m) > 2
+        if not chords and self.mission.terrain is None:
             return flown_s
         begin = self._nodes.get(_known_as(planned_enu_m[0]))
         end = self._nodes.get(_known_as(planned_enu_m[-1]))

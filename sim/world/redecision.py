@@ -168,6 +168,7 @@ class _Memory:
             landed_at=basis.landed_at,
             parked=basis.parked,
             blocking=dict(basis.blocking),
+            flown_m=basis.flown_m,
         )
         if self._board.field_problem is not None:
             return self._decided_in_field(self._board.field_problem, choice, turn)

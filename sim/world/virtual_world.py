@@ -41,6 +41,7 @@ from coordinator.operator.requests import OperatorClient, OperatorRequest
 from sim.world.closest_approach import closest_approach
 from sim.world.engine import EventQueue, LocalClock, Process
 from sim.world.flight_log import FlightLog, LastSeen
+from sim.world.ground_clearance import lowest_clearance
 from sim.world.network import IdealNetwork
 from sim.world.settings import (
     QUIET,
@@ -176,6 +177,10 @@ class World:
         """Least distance of two UAVs while both were in the air [m]; None if never two were."""
         nearest = closest_approach(self.tracks)
         return None if nearest is None else nearest.distance_m
+
+    def lowest_clearance_m(self) -> float | None:
+        """Least height of a UAV in flight above the ground [m]; None where there is no terrain."""
+        return lowest_clearance(self.tracks, self.mission.terrain)
 
     # -- what befalls processes -------------------------------------------------------
 

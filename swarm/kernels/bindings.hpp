@@ -12,6 +12,7 @@ void bind_field_team(nanobind::module_& module);
 void bind_field_search(nanobind::module_& module);
 void bind_field_alone(nanobind::module_& module);
 void bind_field_insertion(nanobind::module_& module);
+void bind_ground(nanobind::module_& module);
 void bind_long_tours(nanobind::module_& module);
 void bind_lower_level(nanobind::module_& module);
 void bind_problem(nanobind::module_& module);

@@ -17,4 +17,5 @@ NB_MODULE(_kernels, module) {
     peckorder::bind_field_search(module);
     peckorder::bind_field_alone(module);
     peckorder::bind_field_insertion(module);
+    peckorder::bind_ground(module);
 }

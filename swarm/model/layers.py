@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from swarm.model.terrain import Terrain
+
 
 @dataclass(frozen=True, slots=True)
 class FlightLayers:
@@ -25,3 +27,11 @@ class FlightLayers:
     def layer_m(self, index: int) -> float:
         """Layer of the UAV with that place in the scenario [m]."""
         return self.lowest_m + index * self.spacing_m
+
+
+def layers_over(terrain: Terrain | None, layers: FlightLayers | None = None) -> FlightLayers:
+    """Those layers, or the usual ones, the lowest as far from the ground as paths are planned."""
+    usual = FlightLayers() if layers is None else layers
+    if terrain is None or usual.lowest_m >= terrain.planned_m:
+        return usual
+    return FlightLayers(terrain.planned_m, usual.spacing_m)

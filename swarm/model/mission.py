@@ -9,6 +9,7 @@ from dataclasses import dataclass, field, replace
 from swarm.model.areas import Area
 from swarm.model.frames import Origin
 from swarm.model.ids import RESERVED, BaseId, TaskId, UavId, require_id
+from swarm.model.terrain import Terrain
 from swarm.model.zones import Zone
 
 PLAIN_CONSTRAINTS = frozenset({"acceleration_m_s2"})
@@ -140,7 +141,8 @@ class Task:
     trigger_m: float | None = None
     """Of a line, how far apart pictures are taken along it [m]; > 0. None: none are."""
     height_m: float | None = None
-    """Where it is flown [m above the origin]; None: in the UAV's own layer above the place."""
+    """Where it is flown [m above the origin; of a mission with a terrain above the ground there];
+    None: in the UAV's own layer above the place."""
 
     def __post_init__(self) -> None:
         require_id(self.id, "task id")
@@ -194,6 +196,8 @@ class Mission:
     """Heights above the ground that may be used [m]; None: each UAV in its own layer."""
     areas: tuple[Area, ...] = ()
     """What some of the tasks cover together; the lines of each are among the tasks."""
+    terrain: Terrain | None = None
+    """The ground, on which all places then lie; None: it is flat, and nobody looks at it."""
     schema: int = field(default=1, compare=False)
     """Of the file that it is from; 2 whenever it has constraints. Plans of such tell schedules."""
 
@@ -228,6 +232,8 @@ class Mission:
             raise ValueError(f"zone_margin_m must be >= 0, not {self.zone_margin_m}")
         if self.band_m is not None and not 0.0 <= self.band_m[0] < self.band_m[1] < math.inf:
             raise ValueError(f"band_m must be two growing heights >= 0, not {self.band_m}")
+        if self.band_m is not None and self.terrain is not None:
+            raise ValueError("band_m is not known beside a terrain")
 
     @property
     def constraints(self) -> tuple[str, ...]:
@@ -248,6 +254,7 @@ class Mission:
             "base": self.bases,
             "zone": self.zones,
             "band_m": self.band_m is not None,
+            "terrain": self.terrain is not None,
         }
         return (*found, *(key for key, has in of_mission.items() if has))
 

@@ -46,6 +46,9 @@ class ScheduleEntry:
     """When that is done, and the UAV is ready."""
     is_reversed: bool = False
     """A line is flown from its last point to its first."""
+    up_m: tuple[float, ...] = ()
+    """Heights flown where it departs and at all corners [m above the mission origin]; empty where
+    nobody looks at the ground."""
 
     @property
     def base(self) -> BaseId | None:

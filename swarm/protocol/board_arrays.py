@@ -135,6 +135,7 @@ def mission_with(
         zone_margin_m=brief.zone_margin_m,
         band_m=brief.band_m,
         areas=tuple(area.area() for area in brief.areas),
+        terrain=None if brief.terrain is None else brief.terrain.terrain(),
     )
 
 

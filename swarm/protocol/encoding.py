@@ -19,6 +19,7 @@ from swarm.protocol.field_messages import (
     AreaSpec,
     BaseSpec,
     CameraSpec,
+    TerrainSpec,
     UavReady,
     ZoneEdit,
     ZoneSpec,
@@ -26,6 +27,7 @@ from swarm.protocol.field_messages import (
 from swarm.protocol.messages import (
     FIELD_VERSION,
     SCHEMA_VERSION,
+    TERRAIN_VERSION,
     Body,
     Message,
     MissionConfig,
@@ -79,6 +81,7 @@ FIELDS: Final[dict[type, tuple[str, ...]]] = {
         ZoneSpec,
         AreaSpec,
         CameraSpec,
+        TerrainSpec,
         ChoiceBasis,
         Candidate,
     )
@@ -89,7 +92,15 @@ _OF_TASKS: Final = frozenset(
 )
 _OF_CLAIMS: Final = ("base", "stage", "arrives_s", "sortie_end_s", "reversed", "departs_s")
 _OF_UAVS: Final = ("airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
-_OF_BRIEFS: Final = ("bases", "zones", "wind_enu_m_s", "zone_margin_m", "band_m", "areas")
+_OF_BRIEFS: Final = (
+    "bases",
+    "zones",
+    "wind_enu_m_s",
+    "zone_margin_m",
+    "band_m",
+    "areas",
+    "terrain",
+)
 SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
     UavSpec: frozenset({"acceleration_m_s2", *_OF_UAVS}),
     MissionConfig: frozenset(_OF_BRIEFS),
@@ -99,7 +110,7 @@ SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
     Claim: frozenset(_OF_CLAIMS),
     Outcome: frozenset({"reversed"}),
     Choice: frozenset({"base"}),
-    ChoiceBasis: frozenset({"sortie_end_s", "landed_at", "parked", "blocking"}),
+    ChoiceBasis: frozenset({"sortie_end_s", "landed_at", "parked", "blocking", "flown_m"}),
     Calibration: frozenset({"land_s", "climb_s", "acceleration_m_s2", "speed_m_s"}),
 }
 """Fields that came with `FIELD_VERSION`; left out where they are as by default, so that a statement
@@ -183,7 +194,7 @@ def _message_bytes(message: Message) -> bytes:
     stamp, body = message.stamp, message.body
     plain = _is_plain(body)
     parts = (
-        SCHEMA_VERSION if plain else FIELD_VERSION,
+        SCHEMA_VERSION if plain else _version_of(body),
         message.mission,
         message.writer,
         stamp.incarnation,
@@ -194,6 +205,12 @@ def _message_bytes(message: Message) -> bytes:
     packer = msgpack.Packer(default=_plain_fields_of if plain else _fields_of)
     packed: bytes = packer.pack(parts)  # by `packb` a claim takes a tenth longer
     return packed
+
+
+def _version_of(body: Body) -> int:
+    """Which releases must understand what has more in it than the first one did."""
+    over_ground = isinstance(body, MissionConfig) and body.terrain is not None
+    return TERRAIN_VERSION if over_ground else FIELD_VERSION
 
 
 def _is_plain(part: object) -> bool:

@@ -6,13 +6,16 @@ brief's, for the flight of the mission that it names; see swarm.protocol.operato
 
 from __future__ import annotations
 
+import zlib
 from dataclasses import asdict, dataclass
+from functools import lru_cache
 from typing import Annotated
 
 from annotated_types import Ge, Gt, Le, Len
 from pydantic import Strict
 
 from swarm.model import Area, AreaId, Base, BaseId, Camera, Zone, ZoneId
+from swarm.model.terrain import MOST_HEIGHTS, Terrain
 from swarm.protocol.fields import (
     MAX_COUNT,
     Checked,
@@ -20,6 +23,7 @@ from swarm.protocol.fields import (
     Duration,
     Flag,
     FlatPoint,
+    Height,
     Id,
     Instant,
     Metres,
@@ -167,6 +171,93 @@ class AreaSpec(Checked):
 
 _OF_AREAS = tuple(name for name in AreaSpec.__dataclass_fields__ if name not in ("id", "camera"))
 """What is said of an area as it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class TerrainSpec(Checked):
+    """The ground as a brief describes it.
+
+    Raises:
+        ValueError: it is no ground that a mission could have.
+    """
+
+    clearance_m: Height
+    """No path comes closer to the ground [m]."""
+    west_m: Metres
+    south_m: Metres
+    """Of the first height [m; mission origin]."""
+    east_step_m: Metres
+    north_step_m: Metres
+    """Between heights [m]."""
+    columns: Annotated[int, Strict(), Ge(2), Le(MOST_HEIGHTS)]
+    lowest_m: Metres
+    """What all heights are above [m; mission origin]."""
+    packed: Annotated[bytes, Strict(), Len(1, 2 * MOST_HEIGHTS + 4096)]
+    """By zlib: the differences of all steps of the terrain from the ones before, modulo 65536, the
+    lower bytes of all of them and then the higher ones."""
+
+    def __post_init__(self) -> None:
+        self.terrain()
+
+    def terrain(self) -> Terrain:
+        """As missions have it."""
+        return _terrain_of(
+            self.clearance_m,
+            *(self.west_m, self.south_m, self.east_step_m, self.north_step_m),
+            self.columns,
+            self.lowest_m,
+            self.packed,
+        )
+
+    @classmethod
+    def of(cls, terrain: Terrain) -> TerrainSpec:
+        """``terrain`` as a brief describes it."""
+        return cls(
+            terrain.clearance_m,
+            *(terrain.west_m, terrain.south_m, terrain.east_step_m, terrain.north_step_m),
+            terrain.columns,
+            terrain.lowest_m,
+            _packed(terrain.steps),
+        )
+
+
+@lru_cache(maxsize=4)
+def _packed(steps: bytes) -> bytes:
+    import numpy as np  # only where there is a terrain
+
+    heights = np.frombuffer(steps, dtype="<u2")
+    differences = np.diff(heights, prepend=np.zeros(1, dtype="<u2")).astype("<u2")
+    return zlib.compress(differences.view(np.uint8).reshape(-1, 2).T.tobytes(), 9)
+
+
+@lru_cache(maxsize=4)
+def _terrain_of(
+    clearance_m: float,
+    west_m: float,
+    south_m: float,
+    east_step_m: float,
+    north_step_m: float,
+    columns: int,
+    lowest_m: float,
+    packed: bytes,
+) -> Terrain:
+    import numpy as np
+
+    try:
+        data = zlib.decompressobj().decompress(packed, 2 * MOST_HEIGHTS + 1)
+    except zlib.error as error:
+        raise ValueError("the heights of a terrain are not packed by zlib") from error
+    if not data or len(data) % 2:
+        raise ValueError(f"{len(data)} bytes are no heights")
+    differences = np.frombuffer(data, dtype=np.uint8).reshape(2, -1).T
+    steps = np.cumsum(np.ascontiguousarray(differences).view("<u2").ravel(), dtype="<u2")
+    return Terrain(
+        clearance_m,
+        *(west_m, south_m, east_step_m, north_step_m),
+        columns,
+        lowest_m,
+        steps.tobytes(),
+    )
 
 
 @dataclass(frozen=True, slots=True)

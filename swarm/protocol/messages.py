@@ -18,7 +18,14 @@ from pydantic import Strict
 
 from swarm.model import Origin
 from swarm.model.ids import AUTHORITY, FLEET, RESERVED
-from swarm.protocol.field_messages import AreaSpec, BaseSpec, UavReady, ZoneEdit, ZoneSpec
+from swarm.protocol.field_messages import (
+    AreaSpec,
+    BaseSpec,
+    TerrainSpec,
+    UavReady,
+    ZoneEdit,
+    ZoneSpec,
+)
 from swarm.protocol.fields import (
     MAX_COUNT,
     Acceleration,
@@ -47,6 +54,8 @@ SCHEMA_VERSION = 1
 """Grows only with what releases before cannot be mixed with; see swarm.protocol.codec."""
 FIELD_VERSION = 2
 """Of statements that tell of what the field asks for, which releases before must not pass over."""
+TERRAIN_VERSION = 3
+"""Of briefs with a ground: who knows nothing of it would fly into it."""
 LONGEST_ROSTER = 1 << 20
 """Characters of a signed roster."""
 
@@ -115,6 +124,9 @@ class MissionConfig(Checked):
     """Heights above the ground that may be used [m]; None: each UAV in its own layer."""
     areas: tuple[AreaSpec, ...] = ()
     """What some of the tasks cover together."""
+    terrain: TerrainSpec | None = None
+    """The ground, on which all places lie, and above which heights of tasks count; None: it is
+    flat, and nobody looks at it."""
 
     def __post_init__(self) -> None:
         Origin(*self.origin)
@@ -130,6 +142,8 @@ class MissionConfig(Checked):
             raise ValueError(f"a UAV is not faster than the wind of {wind_m_s:g} m/s")
         if self.band_m is not None and self.band_m[0] >= self.band_m[1]:
             raise ValueError(f"band_m must be two growing heights, not {self.band_m}")
+        if self.band_m is not None and self.terrain is not None:
+            raise ValueError("band_m is not known beside a terrain")
 
 
 class MissionPhase(StrEnum):
@@ -190,7 +204,8 @@ class PostedTask(Checked):
     path_enu_m: tuple[Point, ...] = ()
     """Points of a line [m; mission origin]; empty of a place."""
     height_m: Metres | None = None
-    """Where it is flown [m above the origin]; None: in the UAV's own layer above the place."""
+    """Where it is flown [m above the origin; above the ground there if the brief has a terrain];
+    None: in the UAV's own layer above the place."""
     trigger_m: Metres | None = None
     """Of a line, how far apart pictures are taken along it [m]; None: none are."""
 

@@ -25,6 +25,7 @@ from swarm.protocol.fields import (
     Flag,
     Id,
     Instant,
+    Metres,
     Point,
     Probability,
     Reason,
@@ -74,6 +75,8 @@ class ChoiceBasis(Checked):
     """Whether it stood there beside the slots."""
     blocking: tuple[tuple[Id, Id], ...] = ()
     """Lost UAVs, each with the base on whose slot it stood."""
+    flown_m: Metres | None = None
+    """Height at which it hovered out of its layer over the ground [m]; None: it did not."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -23,6 +23,7 @@ from swarm.scenario.shapes import (
     OriginTable,
     Scenario,
     TaskTable,
+    TerrainTable,
     UavTable,
     ZoneTable,
 )
@@ -52,6 +53,7 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         ".waypoints, .geojson or .csv.",
         "mission": "",
         "origin": "",
+        "terrain": "",
         "uav": "",
         "base": "",
         "zone": "",
@@ -80,6 +82,13 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "lon_deg": "",
         "alt_m": "Height of that place above mean sea level [m]. A vehicle that finds its ground "
         "more than 10 m above or below is not started.",
+    },
+    "terrain": {
+        "file": "Heights of the ground, beside this file: a GeoTIFF (.tif) or an SRTM tile "
+        "(N47E008.hgt, zipped or not). All places then stand on that ground and take no heights of "
+        "their own; layers and height_m count from the ground below.",
+        "clearance_m": "Nobody comes nearer to that ground between take-off and landing [m]; "
+        "plans keep 3 m more.",
     },
     "uav": {
         "id": "Name of the UAV: what --uav, hold and return call it.",
@@ -165,7 +174,8 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "is better; points as position_m.",
         "path": "The same by latitude and longitude [deg].",
         "trigger_m": "A picture every so many metres along the line [m]. Absent: none.",
-        "height_m": "It is flown that high above the origin [m]. Absent: in the UAV's layer.",
+        "height_m": "It is flown that high above the origin, with [terrain] above the ground "
+        "there [m]. Absent: in the UAV's layer.",
     },
 }
 """What every field means, by table; empty for one that is explained with the one before."""
@@ -173,6 +183,7 @@ _TABLES: Mapping[str, type[BaseModel]] = {
     "": Scenario,
     "mission": MissionTable,
     "origin": OriginTable,
+    "terrain": TerrainTable,
     "uav": UavTable,
     "base": BaseTable,
     "zone": ZoneTable,
@@ -236,6 +247,7 @@ _EXAMPLES: Mapping[tuple[str, str], str] = {
 }
 """Values of fields that may be left out, as they could be."""
 _ENTRIES: Mapping[str, Mapping[str, object]] = {
+    "terrain": {"file": "hills.tif", "clearance_m": 20.0},
     "base": {"id": "b1", "position_m": [0.0, -20.0]},
     "zone": {"id": "z1", "polygon_m": [[300.0, 200.0], [400.0, 200.0], [300.0, 300.0]]},
     "area": {
@@ -302,6 +314,7 @@ def _lines(blank: Blank, mission: Mission) -> Iterator[str]:
     yield from _explained("mission", {"horizon_s": mission.horizon_s})
     yield "[origin]"
     yield from _explained("origin", asdict(blank.origin))
+    yield from _commented("terrain")
     for number, uav in enumerate(mission.uavs):
         given = {
             "id": uav.id,
@@ -325,7 +338,7 @@ def _lines(blank: Blank, mission: Mission) -> Iterator[str]:
 
 def _commented(table: str) -> Iterator[str]:
     """A table as it could be, all of it in comments."""
-    yield f"# [[{table}]]"
+    yield f"# [{table}]" if table == "terrain" else f"# [[{table}]]"
     for line in _explained(table, _ENTRIES[table]):
         yield line if not line or line.startswith("#") else f"# {line}"
 

@@ -18,10 +18,9 @@ NEW_KEYS: Mapping[str, Sequence[str]] = {
     "task": ("due_s", "opens_s", "closes_s", "path_m", "path", "trigger_m", "height_m"),
 }
 """What schema 2 adds to the tables of schema 1."""
-NEW_TABLES = ("base", "zone", "area")
+NEW_TABLES = ("base", "zone", "area", "terrain")
 """Tables of schema 2."""
 _LATER_KEYS: Mapping[str, Sequence[str]] = {"mission": ("separation_m",)}
-_LATER_TABLES: Mapping[str, str] = {"terrain": "[terrain]"}
 
 
 def edition_of(document: Document) -> int:
@@ -38,14 +37,14 @@ def edition_faults(document: Document) -> Iterator[Finding]:
     if given == 1 and not isinstance(given, bool):
         used = [
             *_used(document, NEW_TABLES, NEW_KEYS),
-            *_used(document, tuple(_LATER_TABLES), _LATER_KEYS),
+            *_used(document, (), _LATER_KEYS),
         ]
         if words := list(dict.fromkeys(_word(path) for path in used)):
             told = " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
             verb = "are" if words[1:] else "is"
             yield Finding(("schema",), f"is 1, and {told} {verb} of schema 2", "give schema = 2")
     named: set[str] = set()
-    for path in _used(document, tuple(_LATER_TABLES), _LATER_KEYS):
+    for path in _used(document, (), _LATER_KEYS):
         if (word := _word(path)) not in named:
             named.add(word)
             yield Finding(path, f"this release does not plan by {word} yet", "leave it out")
@@ -53,7 +52,7 @@ def edition_faults(document: Document) -> Iterator[Finding]:
 
 def without_later(document: Document) -> Document:
     """``document`` without the words that are not planned by yet."""
-    kept = {key: value for key, value in document.items() if key not in _LATER_TABLES}
+    kept = dict(document)
     for table, keys in _LATER_KEYS.items():
         if table in kept:
             kept[table] = _without(kept[table], keys)
@@ -87,4 +86,4 @@ def _word(path: Path) -> str:
     word = str(path[-1])
     if len(path) > 1:
         return word
-    return _LATER_TABLES.get(word, f"[[{word}]]")
+    return "[terrain]" if word == "terrain" else f"[[{word}]]"

@@ -15,6 +15,7 @@ from itertools import pairwise
 
 from swarm.model import Origin, Zone, ZoneId
 from swarm.scenario.findings import Document, Finding, Path, number_of, shown
+from swarm.scenario.ground import terrain_faults
 from swarm.scenario.places import (
     LINE,
     POLYGON,
@@ -36,6 +37,7 @@ _SIMPLE = "give three corners or more, round a simple polygon"
 def field_faults(document: Document) -> Iterator[Finding]:
     """What is wrong with wind and zones, and with places because of them."""
     yield from _slow_uavs(document)
+    yield from terrain_faults(document)
     frame = origin_of(document.get("origin"))
     zones: list[_Keeping] = []
     for index, entry in entries(document, "zone"):

@@ -57,14 +57,15 @@ def parse_scenario(data: bytes, source: str, folder: Path = Path()) -> Mission:
     Places in degrees are converted to the local frame; without ``alt_m`` they
     lie at the height of the origin.
 
-    ``source`` names it in messages; a file of ``tasks_from`` is looked for in ``folder``.
+    ``source`` names it in messages; files of ``tasks_from`` and ``[terrain]`` are looked for in
+    ``folder``.
 
     Raises:
         InputError: with every fault of the file, in the order of the file.
     """
     document = parse_toml(data, source, _WHAT)
     if "tasks_from" not in document:
-        return build_mission(document, source)
+        return build_mission(document, source, folder=folder)
     from swarm.scenario.task_files import ImportOptions, read_task_files
 
     document = {**document, "task": document.get("task", [])}
@@ -78,11 +79,15 @@ def parse_scenario(data: bytes, source: str, folder: Path = Path()) -> Mission:
         origin, visits_alone=edition_of(document) == 1, has_terrain="terrain" in document
     )
     tasks = read_task_files([folder / name], options)
-    return build_mission(document, source, replace(tasks, zones=()))
+    return build_mission(document, source, replace(tasks, zones=()), folder)
 
 
-def build_mission(document: Document, source: str, tasks: TaskFile | None = None) -> Mission:
+def build_mission(
+    document: Document, source: str, tasks: TaskFile | None = None, folder: Path = Path()
+) -> Mission:
     """The mission of a parsed scenario and of the ``tasks`` that come from elsewhere.
+
+    The file of its ``[terrain]`` is looked for in ``folder``.
 
     Tasks, areas and zones of a file follow those of the document; tasks and areas are worth 1
     unless the file says otherwise. Its home is the origin where the document names none.
@@ -105,6 +110,10 @@ def build_mission(document: Document, source: str, tasks: TaskFile | None = None
             from swarm.scenario.area_faults import with_lines
 
             mission, findings = with_lines(mission)
+        if not findings and (terrain := scenario.terrain) is not None:
+            from swarm.scenario.ground import on_ground
+
+            mission = on_ground(mission, folder / terrain.file, terrain.clearance_m)
         if not findings:
             return mission
     here = [finding for finding in findings if not _from_file(finding, first)]

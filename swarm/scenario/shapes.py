@@ -142,6 +142,13 @@ class OriginTable(StrictTable):
     alt_m: _Altitude
 
 
+class TerrainTable(StrictTable):
+    """``[terrain]``."""
+
+    file: Annotated[str, Field(min_length=1, max_length=4096)]
+    clearance_m: Annotated[float, Field(ge=0.0, le=1e4)]
+
+
 class _Placed(StrictTable):
     position_m: _Point | None = None
     lat_deg: _Latitude | None = None
@@ -244,6 +251,7 @@ class Scenario(StrictTable):
     name: Id
     mission: MissionTable
     origin: OriginTable | None = None
+    terrain: TerrainTable | None = None
     uav: Annotated[list[UavTable], AfterValidator(_require_fleet)]
     base: list[BaseTable] = Field(default_factory=list)
     zone: list[ZoneTable] = Field(default_factory=list)
@@ -256,6 +264,7 @@ _TABLES: Mapping[tuple[str, ...], TableShape] = {
     (): TableShape.of("the top", Scenario),
     ("mission",): TableShape.of("[mission]", MissionTable),
     ("origin",): TableShape.of("[origin]", OriginTable),
+    ("terrain",): TableShape.of("[terrain]", TerrainTable),
     ("uav",): TableShape.of("[[uav]]", UavTable),
     ("base",): TableShape.of("[[base]]", BaseTable),
     ("zone",): TableShape.of("[[zone]]", ZoneTable),
@@ -287,6 +296,9 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("name",): f'an id of {ID_RULE}, such as name = "survey-1"',
     ("mission",): "a table [mission] with at least horizon_s",
     ("origin",): "a table [origin] with lat_deg, lon_deg and alt_m",
+    ("terrain",): "a table [terrain] with file and clearance_m",
+    ("terrain", "file"): 'a GeoTIFF or an SRTM tile, such as file = "hills.tif"',
+    ("terrain", "clearance_m"): "a distance within 0..1e4 [m], such as clearance_m = 20.0",
     ("uav",): "one table [[uav]] per UAV",
     ("task",): "one table [[task]] per task, or task = [] if all come later",
     ("tasks_from",): 'a file of tasks, such as tasks_from = "survey.plan"',

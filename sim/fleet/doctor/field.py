@@ -19,7 +19,7 @@ from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.network import TooManyLegsError
 from swarm.kernels.field_alone import earliest_alone
 from swarm.model import Mission, Uav
-from swarm.model.layers import FlightLayers
+from swarm.model.layers import layers_over
 from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.survey.facts import area_facts
 
@@ -132,7 +132,7 @@ def _zones(mission: Mission, problem: FieldProblem) -> Iterator[CheckFinding]:
     """Whether zones concern somebody, and shut nobody in."""
     if not mission.zones:
         return
-    layers = FlightLayers()
+    layers = layers_over(mission.terrain)
     heights_m = [
         layers.layer_m(number) + uav.position_enu_m[2] for number, uav in enumerate(mission.uavs)
     ]

@@ -14,7 +14,7 @@ from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 from swarm.identity import Identity, Role, load_identity
 from swarm.identity.folder import shown_time
 from swarm.model import Mission
-from swarm.model.layers import FlightLayers
+from swarm.model.layers import layers_over
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario
 
@@ -38,7 +38,7 @@ def check_scenario(path: Path) -> tuple[Mission | None, list[CheckFinding]]:
         found = [warns("scenario", f"{text}, and no origin", remedy)]
     else:
         found = [fine("scenario", f"{text}, D = {mission.horizon_s:g} s")]
-    if (warning := height_warning(mission, FlightLayers())) is not None:
+    if (warning := height_warning(mission, layers_over(mission.terrain))) is not None:
         problem, _, remedy = warning.partition(": ")
         found.append(warns("height", problem, remedy))
     found += check_field(mission)

@@ -14,14 +14,19 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from swarm.model import Base, Mission, Task, Uav
-from swarm.model.layers import FlightLayers
+from swarm.model import Base, Mission, Task, Uav, Zone
+from swarm.model.layers import layers_over
 
 if TYPE_CHECKING:
     from swarm.allocation.legs import FlightModel, LegNetwork
+    from swarm.allocation.legs.ground import Ground
 
 FloatArray = npt.NDArray[np.float64]
 IntArray = npt.NDArray[np.int32]
+Point = tuple[float, float, float]
+
+_HIGHER_M = 3.0
+"""Paths may be higher above the ground than they need be [m]: lines, and where corners are few."""
 
 START = -1
 """In the place of a base: the UAV's own start."""
@@ -64,6 +69,7 @@ class FieldNetwork:
     ) -> None:
         # Only where it is needed: plain missions would start a tenth later.
         from swarm.allocation.legs import Airspace, LegNetwork
+        from swarm.allocation.legs.ground import ground_of
 
         if layers_m is not None and len(layers_m) != len(uavs):
             raise ValueError(f"layers_m must have a height for each of {len(uavs)} UAVs")
@@ -71,9 +77,17 @@ class FieldNetwork:
             _layers_m(mission, uavs) if layers_m is None else list(map(float, layers_m))
         )
         self._band_m = mission.band_m
-        self._airspace = Airspace(mission.zones, mission.zone_margin_m)
-        self.node_enu_m, self.enter, self._in_layer = _nodes(uavs, mission.bases, tasks)
-        self._lines = _Lines(tasks)
+        zones = mission.zones
+        self._ground: Ground | None = None
+        if mission.terrain is not None:
+            self._ground = ground_of(mission.terrain)
+            # Heights over the ground follow from the paths: zones that could matter, matter.
+            self._band_m = -np.inf, np.inf
+            zones = tuple(_zones_over(self._ground, mission, max(self._layers_m)))
+        self._airspace = Airspace(zones, mission.zone_margin_m)
+        flown = [_points(task, self._ground) for task in tasks]
+        self.node_enu_m, self.enter, self._in_layer = _nodes(uavs, mission.bases, tasks, flown)
+        self._lines = _Lines(tasks, flown)
         networks: dict[bytes, LegNetwork] = {}
         kinds: dict[tuple[FlightModel, bytes], int] = {}
         kind = []
@@ -86,7 +100,14 @@ class FieldNetwork:
             line_m, in_layer = self._lines.point_m, self._lines.in_layer
             sides += self._sides(*self._heights_m(layer_m, line_m, in_layer))
             if sides not in networks:
-                networks[sides] = LegNetwork(self._airspace, self.node_enu_m, low_m, high_m)
+                networks[sides] = LegNetwork(
+                    self._airspace,
+                    self.node_enu_m,
+                    low_m,
+                    high_m,
+                    self._ground,
+                    np.where(self._in_layer, 0.0, self._room_m),
+                )
             if (model, sides) not in kinds:
                 kinds[model, sides] = len(kinds)
                 self._kinds.append((model, networks[sides]))
@@ -101,7 +122,7 @@ class FieldNetwork:
         """(n_kind, n_task, 2) times along lines, forwards and backwards [s]; infinite: through
         zones."""
         for row, (model, _) in enumerate(self._kinds):
-            _add_lines_s(model, tasks, self.line_s[row])
+            _add_lines_s(model, flown, self.line_s[row])
             if self._airspace.zones:
                 self.line_s[row, self._cut_off(self._layers_m[kind.index(row)])] = np.inf
         self.home_s, self.home = self._homes(len(mission.bases))
@@ -168,10 +189,11 @@ class FieldNetwork:
             uav: its row.
             place_enu_m: (3,) place [m; ENU], its height as tasks give theirs, without the layer.
             flown_m: height there [m above the origin]; in the UAV's layer above it when None.
+                Over the ground the place's own height says that it is out of its layer.
         """
         model, network = self._kind_of(uav)
-        place_m, low_m, high_m = self._placed(uav, place_enu_m, flown_m)
-        times_s: FloatArray = network.legs_from(place_m, low_m, high_m).times_s(model)[0]
+        placed = self._placed(uav, place_enu_m, flown_m)
+        times_s: FloatArray = network.legs_from(*placed).times_s(model)[0]
         flown_s: FloatArray = times_s * self.time_frac[uav]
         flown_s[: self._n_home] += self.land_s[uav]
         return flown_s
@@ -180,6 +202,17 @@ class FieldNetwork:
         """(k, 3) places [m; ENU] of the leg between two nodes, both included; None: no way."""
         _, network = self._kind_of(uav)
         return network.legs.corners_m(begin, end)
+
+    def flown_between_m(self, uav: int, begin: int, end: int) -> FloatArray | None:
+        """The same with the heights at which ``uav`` flies them over the ground.
+
+        None: there is no way, or nobody looks at the ground.
+        """
+        corners_m = None if self._ground is None else self.corners_m(uav, begin, end)
+        if corners_m is None:
+            return None
+        out_of_layer = not self._in_layer[begin]
+        return self.flown_enu_m(uav, corners_m, end, out_of_layer=out_of_layer)
 
     def corners_from_m(
         self,
@@ -192,19 +225,35 @@ class FieldNetwork:
         _, network = self._kind_of(uav)
         return network.legs_from(*self._placed(uav, place_enu_m, flown_m)).corners_m(0, end)
 
-    def flown_enu_m(self, uav: int, corners_enu_m: FloatArray, end: int) -> FloatArray:
+    def flown_enu_m(
+        self, uav: int, corners_enu_m: FloatArray, end: int, *, out_of_layer: bool = False
+    ) -> FloatArray:
         """(k, 3) corners [m; ENU] of a leg to a node, with the heights at which ``uav`` flies them.
 
         Its layer is added where it keeps to it: at the beginning, and at the end unless the task
         there gives its own height. In between height is gained evenly.
+
+        Args:
+            uav: its row.
+            corners_enu_m: (k, 3) as `corners_from_m` gives them.
+            end: the node.
+            out_of_layer: over the ground, that the height of the first corner is the one flown.
         """
         layer_m = self._layers_m[uav]
         piece_m = np.hypot(*np.diff(corners_enu_m[:, :2], axis=0).T)
         along_m = np.concatenate([[0.0], np.cumsum(piece_m)])
         share = along_m / along_m[-1] if along_m[-1] > 0.0 else np.ones(len(along_m))
         flown_m = corners_enu_m.copy()
-        flown_m[:, 2] += layer_m if self._in_layer[end] else layer_m * (1.0 - share)
+        if out_of_layer:
+            flown_m[:, 2] += layer_m * share if self._in_layer[end] else 0.0
+        else:
+            flown_m[:, 2] += layer_m if self._in_layer[end] else layer_m * (1.0 - share)
         return flown_m
+
+    def rooms_m(self, uav: int, end: int, *, out_of_layer: bool) -> tuple[float, float]:
+        """What a way of ``uav`` to a node keeps above the ground at its ends, layers included."""
+        layer_m, room_m = self._layers_m[uav], self._room_m
+        return room_m if out_of_layer else layer_m, layer_m if self._in_layer[end] else room_m
 
     def way_out_m(
         self, uav: int, place_enu_m: Sequence[float] | FloatArray
@@ -213,7 +262,7 @@ class FieldNetwork:
 
         Whoever has nowhere to go is told where it is.
         """
-        place_m, low_m, high_m = self._placed(uav, place_enu_m)
+        place_m, low_m, high_m, _ = self._placed(uav, place_enu_m)
         out_m, free = self._airspace.concerning(low_m, high_m).way_out_m(place_m[:, :2])
         return None if free[0] else (float(out_m[0, 0]), float(out_m[0, 1]), float(place_m[0, 2]))
 
@@ -222,12 +271,18 @@ class FieldNetwork:
 
     def _placed(
         self, uav: int, place_enu_m: Sequence[float] | FloatArray, flown_m: float | None = None
-    ) -> tuple[FloatArray, float, float]:
+    ) -> tuple[FloatArray, float, float, float]:
+        """The place, lowest and greatest height there, and what it keeps above the ground [m]."""
         place_m = np.asarray(place_enu_m, dtype=np.float64).reshape(1, 3)
         if self._band_m is not None:
-            return place_m, *self._band_m
+            return place_m, *self._band_m, self._room_m if flown_m == place_m[0, 2] else 0.0
         height_m = float(place_m[0, 2]) + self._layers_m[uav] if flown_m is None else flown_m
-        return place_m, height_m, height_m
+        return place_m, height_m, height_m, 0.0
+
+    @property
+    def _room_m(self) -> float:
+        """What UAVs out of their layers keep above the ground [m]; in a layer that is the layer."""
+        return 0.0 if self._ground is None else self._ground.terrain.planned_m
 
     def _heights_m(
         self, layer_m: float, place_m: FloatArray, in_layer: npt.NDArray[np.bool_]
@@ -286,7 +341,7 @@ class FieldNetwork:
 
 
 def _layers_m(mission: Mission, uavs: Sequence[Uav]) -> list[float]:
-    layers = FlightLayers()
+    layers = layers_over(mission.terrain)
     places = {uav.id: index for index, uav in enumerate(mission.uavs)}
     return [
         layers.layer_m(places.get(uav.id, row)) if uav.layer_m is None else uav.layer_m
@@ -295,7 +350,10 @@ def _layers_m(mission: Mission, uavs: Sequence[Uav]) -> list[float]:
 
 
 def _nodes(
-    uavs: Sequence[Uav], bases: Sequence[Base], tasks: Sequence[Task]
+    uavs: Sequence[Uav],
+    bases: Sequence[Base],
+    tasks: Sequence[Task],
+    flown: Sequence[Sequence[Point]],
 ) -> tuple[FloatArray, IntArray, npt.NDArray[np.bool_]]:
     """(n_node, 3) places [m], (n_task, 2) nodes, (n_node,) whether UAVs keep to their layers there.
 
@@ -304,8 +362,8 @@ def _nodes(
     places = [uav.position_enu_m for uav in uavs] + [base.position_enu_m for base in bases]
     in_layer = [True] * len(places)
     enter = []
-    for task in tasks:
-        ends = _points(task)[:: max(1, len(task.path_enu_m) - 1)]
+    for task, points in zip(tasks, flown, strict=True):
+        ends = points[:: max(1, len(points) - 1)]
         enter.append((len(places), len(places) + len(ends) - 1))
         places += ends
         in_layer += [task.height_m is None] * len(ends)
@@ -319,10 +377,10 @@ def _nodes(
 class _Lines:
     """The lines among tasks, point by point."""
 
-    def __init__(self, tasks: Sequence[Task]) -> None:
-        lines = [(column, task) for column, task in enumerate(tasks) if task.path_enu_m]
-        column = [each for each, task in lines for _ in task.path_enu_m]
-        points = [point for _, task in lines for point in _points(task)]
+    def __init__(self, tasks: Sequence[Task], flown: Sequence[Sequence[Point]]) -> None:
+        lines = [(column, flown[column]) for column, task in enumerate(tasks) if task.path_enu_m]
+        column = [each for each, line in lines for _ in line]
+        points = [point for _, line in lines for point in line]
         self.column: IntArray = np.array(column, dtype=np.int32)
         """(k,) whose point it is."""
         self.point_m: FloatArray = np.array(points, dtype=np.float64).reshape(-1, 3)
@@ -333,12 +391,50 @@ class _Lines:
         """First points of straight pieces."""
 
 
-def _points(task: Task) -> list[tuple[float, float, float]]:
-    """Where a task is flown, a place as one point; height_m goes before what points say."""
-    points = list(task.path_enu_m) or [task.position_enu_m]
+def _points(task: Task, ground: Ground | None) -> Sequence[Point]:
+    """Where a task is flown, a place as one point; height_m goes before what points say.
+
+    Over the ground it counts from there, lines follow it, and layers are still to be added.
+    """
+    points = task.path_enu_m or (task.position_enu_m,)
+    if ground is not None:
+        return points_over(ground, points, task.height_m)
     if task.height_m is None:
         return points
     return [(east_m, north_m, task.height_m) for east_m, north_m, _ in points]
+
+
+def points_over(
+    ground: Ground, points: Sequence[Point], height_m: float | None
+) -> tuple[Point, ...]:
+    """Where a place or a line is flown that high above the ground, or without its layer [m].
+
+    Never lower than paths are planned: whoever posts tasks may not know of the ground.
+    """
+    flat_m = np.array(points, dtype=np.float64)[:, :2]
+    if len(points) == 1:
+        flown_m = np.column_stack([flat_m, ground.up_m(np.ascontiguousarray(flat_m))])
+    else:
+        flown_m = ground.along_m(flat_m)
+    if height_m is not None:
+        flown_m[:, 2] += max(height_m, ground.terrain.planned_m)
+    return tuple((east_m, north_m, up_m) for east_m, north_m, up_m in flown_m.tolist())
+
+
+def _zones_over(ground: Ground, mission: Mission, layer_m: float) -> list[Zone]:
+    """Those of the mission's zones that what flies over the ground could be as high as."""
+    heights_m = [task.height_m for task in mission.tasks if task.height_m is not None]
+    everywhere = (-np.inf, -np.inf, np.inf, np.inf)
+    high_m = ground.range_m(*everywhere)[1] + max(layer_m, *heights_m, 0.0) + _HIGHER_M
+    concerned = []
+    for zone in mission.zones:
+        margin_m = mission.zone_margin_m
+        corners_m = np.array(zone.polygon_enu_m)
+        around = *(corners_m.min(axis=0) - margin_m), *(corners_m.max(axis=0) + margin_m)
+        low_m = ground.range_m(*(everywhere if zone.inclusive else around))[0]
+        if zone.concerns(low_m + ground.terrain.clearance_m, high_m):
+            concerned.append(zone)
+    return concerned
 
 
 def flight_model(uav: Uav, wind_enu_m_s: tuple[float, float]) -> FlightModel:
@@ -353,17 +449,17 @@ def flight_model(uav: Uav, wind_enu_m_s: tuple[float, float]) -> FlightModel:
     return FlightModel(speed_m_s, uav.acceleration_m_s2, airspeed_m_s, wind_enu_m_s)
 
 
-def _add_lines_s(model: FlightModel, tasks: Sequence[Task], line_s: FloatArray) -> None:
-    """Set the (n_task, 2) times of those tasks that are lines [s]."""
-    straight = [index for index, task in enumerate(tasks) if len(task.path_enu_m) == 2]
-    for index, task in enumerate(tasks):
-        if len(task.path_enu_m) > 2:
-            path_m = np.array(_points(task), dtype=np.float64)
+def _add_lines_s(model: FlightModel, flown: Sequence[Sequence[Point]], line_s: FloatArray) -> None:
+    """Set the (n_task, 2) times of those tasks that are lines, by all their points [s]."""
+    straight = [index for index, points in enumerate(flown) if len(points) == 2]
+    for index, points in enumerate(flown):
+        if len(points) > 2:
+            path_m = np.array(points, dtype=np.float64)
             line_s[index] = model.path_s(path_m), model.path_s(path_m[::-1])
             if not model.heeds_direction:  # sums of pieces may differ in their last bit
                 line_s[index, 1] = line_s[index, 0]
     if straight:
-        ends_m = np.array([_points(tasks[index]) for index in straight], dtype=np.float64)
+        ends_m = np.array([flown[index] for index in straight], dtype=np.float64)
         offset_m = (ends_m[:, 1] - ends_m[:, 0]).T
         line_s[straight, 0] = model.straight_s(offset_m)
         line_s[straight, 1] = model.straight_s(-offset_m)

@@ -269,9 +269,12 @@ class FieldProblem:
         """The same from anywhere, see `FieldNetwork.corners_from_m`."""
         return self._known_network().corners_from_m(uav, place_enu_m, end, flown_m)
 
-    def flown_enu_m(self, uav: int, corners_enu_m: FloatArray, end: int) -> FloatArray:
+    def flown_enu_m(
+        self, uav: int, corners_enu_m: FloatArray, end: int, *, out_of_layer: bool = False
+    ) -> FloatArray:
         """(k, 3) corners [m; ENU] to a node with the heights flown, see `FieldNetwork`."""
-        return self._known_network().flown_enu_m(uav, corners_enu_m, end)
+        network = self._known_network()
+        return network.flown_enu_m(uav, corners_enu_m, end, out_of_layer=out_of_layer)
 
     def _known_network(self) -> FieldNetwork:
         if self.network is None:

@@ -40,7 +40,13 @@ class Way:
     """Of its time, how long landing takes, and climbing before it [s]."""
 
 
-def way_to(problem: FieldProblem, uav: int, place_enu_m: Sequence[float], node: int) -> Way | None:
+def way_to(
+    problem: FieldProblem,
+    uav: int,
+    place_enu_m: Sequence[float],
+    node: int,
+    flown_m: float | None = None,
+) -> Way | None:
     """The shortest way to ``node``; None: there is none.
 
     Args:
@@ -48,13 +54,14 @@ def way_to(problem: FieldProblem, uav: int, place_enu_m: Sequence[float], node: 
         uav: its row.
         place_enu_m: where it is [m], without its height layer.
         node: where to: a row of its start, or see `base_node` and `task_nodes`.
+        flown_m: height there [m above the origin]; in its layer above the place when None.
     """
-    corners_m = problem.corners_from_m(uav, place_enu_m, node)
-    duration_s = float(problem.legs_from_s(uav, place_enu_m)[node])
+    corners_m = problem.corners_from_m(uav, place_enu_m, node, flown_m)
+    duration_s = float(problem.legs_from_s(uav, place_enu_m, flown_m)[node])
     if corners_m is None or not np.isfinite(duration_s):
         return None
-    flown_m = problem.flown_enu_m(uav, corners_m, node)
-    points = [(float(east), float(north), float(up)) for east, north, up in flown_m]
+    path_m = problem.flown_enu_m(uav, corners_m, node, out_of_layer=flown_m is not None)
+    points = [(float(east), float(north), float(up)) for east, north, up in path_m]
     base = node - problem.n_uav
     return Way(
         node=node,
@@ -66,14 +73,16 @@ def way_to(problem: FieldProblem, uav: int, place_enu_m: Sequence[float], node: 
     )
 
 
-def way_home(problem: FieldProblem, uav: int, place_enu_m: Sequence[float]) -> Way | None:
+def way_home(
+    problem: FieldProblem, uav: int, place_enu_m: Sequence[float], flown_m: float | None = None
+) -> Way | None:
     """The way to the nearest of all bases and the UAV's own start; None: there is none.
 
     Of those that are as near the start goes first, then the mission's order.
     """
-    legs_s = problem.legs_from_s(uav, place_enu_m)
+    legs_s = problem.legs_from_s(uav, place_enu_m, flown_m)
     ends = [uav, *range(problem.n_uav, problem.n_uav + problem.n_base)]
-    return way_to(problem, uav, place_enu_m, ends[int(np.argmin(legs_s[ends]))])
+    return way_to(problem, uav, place_enu_m, ends[int(np.argmin(legs_s[ends]))], flown_m)
 
 
 def base_node(problem: FieldProblem, base: str) -> int:

@@ -1,7 +1,9 @@
 """Legs of a mission: lengths, times and corners between its places, and from anywhere to them.
 
 A leg's length is √(h² + dz²), h that of the shortest horizontal path round the zones that concern
-it, dz the difference of the ends' heights, gained evenly. Leaves out: who flies which leg.
+it, dz the difference of the ends' heights, gained evenly. Where the ground is known the height
+along that path is the lowest that keeps away from it, and the leg's length that of all its pieces.
+Leaves out: who flies which leg.
 """
 
 from __future__ import annotations
@@ -16,6 +18,7 @@ import numpy.typing as npt
 
 from swarm.allocation.legs.arcs import Arcs
 from swarm.allocation.legs.flight import FlightModel
+from swarm.allocation.legs.ground import Ground
 from swarm.allocation.legs.planner import PathPlanner, Paths, Piece, Targets
 from swarm.allocation.legs.reach import Hop
 from swarm.allocation.legs.tangents import arc_of, sense_of
@@ -110,6 +113,8 @@ class LegNetwork:
         low_m: lowest height used at each node, or everywhere [m above the origin]; by default its
             own. A leg uses all from the lower end's lowest to the higher end's greatest.
         high_m: greatest height, alike.
+        ground: what legs keep away from; None: it is not known.
+        room_m: (n,) how far, at each node [m]; in between it changes evenly over the distance.
     """
 
     def __init__(
@@ -118,16 +123,21 @@ class LegNetwork:
         node_enu_m: FloatArray,
         low_m: FloatArray | float | None = None,
         high_m: FloatArray | float | None = None,
+        ground: Ground | None = None,
+        room_m: FloatArray | float = 0.0,
     ) -> None:
         self.node_enu_m: FloatArray = np.asarray(node_enu_m, dtype=np.float64).reshape(-1, 3)
         """(n, 3) places [m]."""
         self._airspace = airspace
+        self._ground = ground
+        self._room_m = np.broadcast_to(np.asarray(room_m, dtype=np.float64), (len(self),))
         self._heights_m = _heights_m(self.node_enu_m, low_m, high_m)
         self._sides = airspace.sides(*self._heights_m)
         self._targets: dict[tuple[int, PathPlanner], Targets] = {}
 
     def __reduce__(self) -> tuple[type[LegNetwork], tuple[object, ...]]:
-        return type(self), (self._airspace, self.node_enu_m, *self._heights_m)
+        made_of = self._airspace, self.node_enu_m, *self._heights_m, self._ground, self._room_m
+        return type(self), made_of
 
     def __len__(self) -> int:
         return len(self.node_enu_m)
@@ -135,13 +145,14 @@ class LegNetwork:
     @cached_property
     def legs(self) -> Legs:
         """From every node to every other; worked out when first asked for."""
-        return self.legs_from(self.node_enu_m, *self._heights_m)
+        return self.legs_from(self.node_enu_m, *self._heights_m, self._room_m)
 
     def legs_from(
         self,
         place_enu_m: FloatArray,
         low_m: FloatArray | float | None = None,
         high_m: FloatArray | float | None = None,
+        room_m: FloatArray | float = 0.0,
     ) -> Legs:
         """From (m, 3) places [m; ENU] to every node.
 
@@ -149,6 +160,7 @@ class LegNetwork:
             place_enu_m: anywhere; in a zone the leg begins with the shortest way out.
             low_m: lowest height used at each [m above the origin], as for the nodes.
             high_m: greatest height, alike.
+            room_m: what a leg keeps above the ground at each [m], as for the nodes.
         """
         places_m = np.asarray(place_enu_m, dtype=np.float64).reshape(-1, 3)
         blocks = []
@@ -161,7 +173,11 @@ class LegNetwork:
                     rows = side.rows[first : first + at_once]
                     paths = targets.paths_from(places_m[rows, :2])
                     blocks.append(_Block(rows, other.rows, paths, planner.arcs))
-        return Legs(places_m, self.node_enu_m, blocks)
+        over = None
+        if self._ground is not None:
+            begin_m = np.broadcast_to(np.asarray(room_m, dtype=np.float64), (len(places_m),))
+            over = _Over(self._ground, begin_m, self._room_m)
+        return Legs(places_m, self.node_enu_m, blocks, over)
 
     def _targets_of(self, side: int, planner: PathPlanner) -> Targets:
         if (side, planner) not in self._targets:
@@ -180,15 +196,45 @@ class _Block:
     arcs: Arcs
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Over:
+    """The ground under legs, and what they keep above it at their ends [m]."""
+
+    ground: Ground
+    begin_m: FloatArray
+    end_m: FloatArray
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Draped:
+    """Legs over the ground, with the corners of all of them."""
+
+    to: tuple[IntArray, IntArray]
+    """Their (k,) places and (k,) nodes."""
+    first: IntArray
+    """(k,) which piece each begins with."""
+    offset_m: FloatArray
+    """(3, pieces) from corner to corner [m]."""
+
+    def sums(self, of_pieces: FloatArray) -> FloatArray:
+        """(k,) sums over the pieces of each."""
+        return np.add.reduceat(of_pieces, self.first)
+
+
 class Legs:
     """Legs from m places to n nodes, for every kind of UAV."""
 
     def __init__(
-        self, place_enu_m: FloatArray, node_enu_m: FloatArray, blocks: Sequence[_Block]
+        self,
+        place_enu_m: FloatArray,
+        node_enu_m: FloatArray,
+        blocks: Sequence[_Block],
+        over: _Over | None = None,
     ) -> None:
         self._place_enu_m = place_enu_m
         self._node_enu_m = node_enu_m
         self._blocks = blocks
+        self._over = over
         offset_m = self._offset_m()
         self.length_m: FloatArray = straight_m(offset_m)
         """(m, n) lengths [m]; inf: the zones leave no way."""
@@ -198,6 +244,8 @@ class Legs:
             flat_m, rise_m = block.paths.length_m, offset_m[2][cells]
             length_m = np.sqrt(flat_m * flat_m + rise_m * rise_m)
             self.length_m[cells] = np.where(winding, length_m, self.length_m[cells])
+        for draped in self._draped():
+            self.length_m[draped.to] = draped.sums(straight_m(draped.offset_m))
         self._times_s: dict[FlightModel, FloatArray] = {}
 
     def times_s(self, model: FlightModel) -> FloatArray:
@@ -224,6 +272,9 @@ class Legs:
                 return None
             flat_m = block.paths.corners_m(int(rows[0]), int(columns[0]))
             begin_up_m, end_up_m = self._place_enu_m[row, 2], self._node_enu_m[column, 2]
+            if (over := self._over) is not None:
+                room_m = float(over.begin_m[row]), float(over.end_m[column])
+                return over.ground.over_m(flat_m, (begin_up_m, end_up_m), room_m)
             piece_m = np.hypot(*np.diff(flat_m, axis=0).T)
             flown_m = np.concatenate([[0.0], np.cumsum(piece_m)])
             share = (
@@ -239,9 +290,40 @@ class Legs:
         nodes_m = np.ascontiguousarray(self._node_enu_m.T)
         return nodes_m[:, None, :] - self._place_enu_m.T[:, :, None]
 
+    def _draped(self) -> Iterator[_Draped]:
+        """All legs that there are, over the ground if that is known; nothing if it is not."""
+        over = self._over
+        if over is None:
+            return
+        for block in self._blocks:
+            paths = block.paths
+            row, column = np.nonzero(np.isfinite(paths.length_m))
+            if not len(row):
+                continue
+            to = block.rows[row], block.columns[column]
+            corners_m = np.stack([self._place_enu_m[to[0], :2], self._node_enu_m[to[1], :2]], 1)
+            chains_m: list[FloatArray] = list(corners_m)
+            winding = np.flatnonzero(~paths.is_straight[row, column])
+            for path in winding.tolist():
+                chains_m[path] = paths.corners_m(int(row[path]), int(column[path]))
+            first = np.concatenate([[0], np.cumsum([len(chain) for chain in chains_m])])
+            ends_up_m = np.stack([self._place_enu_m[to[0], 2], self._node_enu_m[to[1], 2]], 1)
+            room_m = np.stack([over.begin_m[to[0]], over.end_m[to[1]]], 1)
+            flown_m, first = over.ground.draped(
+                corners_m.reshape(-1, 2) if not len(winding) else np.concatenate(chains_m),
+                first,
+                ends_up_m,
+                room_m,
+            )
+            # The step from the last corner of one leg to the first of the next is no piece.
+            offset_m = np.delete(np.diff(flown_m, axis=0), first[1:-1] - 1, axis=0)
+            yield _Draped(to, first[:-1] - np.arange(len(row)), np.ascontiguousarray(offset_m.T))
+
     def _flown_s(self, model: FlightModel) -> FloatArray:
         if not model.heeds_direction:
             return model.rest_to_rest_s(self.length_m)
+        if self._over is not None:
+            return self._flown_over_s(model)
         offset_m = self._offset_m()
         times_s = model.straight_s(offset_m)
         for block in self._blocks:
@@ -255,6 +337,16 @@ class Legs:
                 pieces = block.paths.pieces(row, column)
                 slow_s = _slow_s(model, block.arcs, rise, pieces)
                 times_s[to] = model.even_s(self.length_m[to], slow_s)
+        return times_s
+
+    def _flown_over_s(self, model: FlightModel) -> FloatArray:
+        times_s = np.full(self.length_m.shape, np.inf)
+        for draped in self._draped():
+            piece_m = straight_m(draped.offset_m)
+            speed_m_s = model.speed_over_m_s(draped.offset_m, piece_m)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                piece_s = np.where(piece_m > 0.0, piece_m / speed_m_s, 0.0)
+            times_s[draped.to] = model.even_s(self.length_m[draped.to], draped.sums(piece_s))
         return times_s
 
 

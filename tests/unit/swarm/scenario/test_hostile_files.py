@@ -407,7 +407,7 @@ def test_an_archive_is_never_unpacked_beyond_what_a_file_may_have() -> None:
 def test_any_damage_to_bytes_gives_entries_or_faults(data: st.DataObject, name: str) -> None:
     content = bytearray((DATA / name).read_bytes())
     for _ in range(data.draw(st.integers(1, 4))):
-        at = data.draw(st.integers(0, len(content) - 1))
+        at = data.draw(st.integers(0, len(content)))
         content[at : at + data.draw(st.integers(0, 3))] = data.draw(st.binary(max_size=3))
     reader = {"l": read_kml, "z": read_kmz, "p": read_shapefiles_in_zip}[name[-1]]
 
@@ -428,7 +428,7 @@ def test_any_damage_to_a_shapefile_gives_entries_or_faults(data: st.DataObject, 
     parts[".cpg"] = b"UTF-8"
     content = bytearray(parts[part])
     for _ in range(data.draw(st.integers(1, 4))):
-        at = data.draw(st.integers(0, len(content) - 1))
+        at = data.draw(st.integers(0, len(content)))
         content[at : at + data.draw(st.integers(0, 4))] = data.draw(st.binary(max_size=4))
     parts[part] = bytes(content)
 
