@@ -109,7 +109,8 @@ def _around(mission: Mission) -> tuple[float, float, float, float]:
     import shapely
 
     tasks = [point for t in mission.tasks for point in (t.position_enu_m, *t.path_enu_m)]
-    stands = [each.position_enu_m for each in (*mission.uavs, *mission.bases)]
+    stands = [uav.position_enu_m for uav in mission.uavs]
+    stands += [base.position_enu_m for base in mission.bases]
     box = shapely.MultiPoint([point[:2] for point in (*stands, *tasks)]).envelope
     margin_m = mission.zone_margin_m
     zones = [zone.shape() for zone in mission.zones]

@@ -68,7 +68,8 @@ class RidgeFleet(BridgedFleet):
             agent=partial(AgentCore, path_clearance_m=PATH_CLEARANCE_M, verticals=Verticals()),
         )
         self._ground = ground_of(mission.terrain)
-        places = [each.position_enu_m for each in (*mission.uavs, *mission.bases)]
+        places = [uav.position_enu_m for uav in mission.uavs]
+        places += [base.position_enu_m for base in mission.bases]
         self._stands = [place[:2] for place in places]
         self._lines = {task.id: task for task in mission.tasks if task.path_enu_m}
         self.lowest_m = math.inf

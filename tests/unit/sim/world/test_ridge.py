@@ -12,7 +12,7 @@ from sim.autopilot.firmware import FirmwareModelName
 from sim.scenarios.hills import FILE, hills_m
 from swarm.allocation.field import FieldProblem
 from swarm.allocation.legs.ground import ground_of
-from swarm.model import Mission
+from swarm.model import Mission, TaskId
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
 from tests.support.bridged_fleet import ONE_DIAGONAL
@@ -52,7 +52,7 @@ def test_all_planned_ways_keep_from_the_ground_and_tell_their_heights(ridge: Mis
 def test_climbing_takes_time(ridge: Mission) -> None:
     over = FieldProblem.from_mission(ridge)
     flat = FieldProblem.from_mission(replace(ridge, terrain=None))
-    behind = over.enter[[task.id for task in ridge.tasks].index("behind"), 0]
+    behind = int(over.enter[over.task_ids.index(TaskId("behind")), 0])
     assert over.leg_s[0, 0, behind] > flat.leg_s[0, 0, behind] + 1.0
 
 

@@ -69,7 +69,7 @@ def test_a_straight_path_is_the_shortest_but_for_having_few_corners(seed: int) -
 
     length_m = float(np.linalg.norm(np.diff(path_m, axis=0), axis=1).sum())
     ends_m = np.column_stack([flat_m, ends_up_m])
-    least_m = plain_length_m(terrain, *ends_m, 600)
+    least_m = plain_length_m(terrain, ends_m[0], ends_m[1], 600)
     assert least_m - 1e-3 <= length_m <= least_m + 4.0 * FEWER_CORNERS_M
 
 

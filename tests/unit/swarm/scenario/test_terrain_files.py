@@ -65,7 +65,7 @@ def tile(void: bool = False) -> bytes:
     heights_m = np.clip(np.round(slope_m(lat_deg, lon_deg)), -400, 9000).astype(">i2")
     if void:
         heights_m[700:740, 590:620] = -32768
-    return heights_m.tobytes()
+    return bytes(heights_m.tobytes())
 
 
 def geotiff(path: Path, heights_m: Any, **given: Any) -> None:
