@@ -396,9 +396,8 @@ class Pilot:
                 self._take_off_up_m = None
             return accepted
         ready = self.armed and self.mode is FlightMode.GUIDED and self.flight.on_ground
-        if not ready or not self.readiness.has_position:
-            return False
-        if up_m is None or up_m <= self.position_enu_m(now_s)[2]:
+        ready = ready and self.readiness.has_position
+        if not ready or up_m is None or up_m <= self.position_enu_m(now_s)[2]:
             return False
         self.lift(up_m, now_s)
         return True
@@ -494,8 +493,8 @@ class Pilot:
             self.task_done = False
         if self.run.mission_changed(old, now_s):
             runs = self.run.state is MissionRunState.RUNNING
-            in_vain = FirmwareEvent.MISSION_REPLACED_IN_VAIN
-            self.narrator.tell(FirmwareEvent.MISSION_REPLACED if runs else in_vain)
+            told, in_vain = FirmwareEvent.MISSION_REPLACED, FirmwareEvent.MISSION_REPLACED_IN_VAIN
+            self.narrator.tell(told if runs else in_vain)
 
     def _boot_us(self, now_s: float) -> int:
         return round((now_s - self.readiness.boot_s) * 1e6)

@@ -391,11 +391,6 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
         "zone_margin_m = 5\nseparation_m = 10.0",
         ["mission.separation_m: this release does not plan by separation_m yet; leave it out"],
     ),
-    "terrain": (
-        "[[zone]]\n",
-        '[terrain]\nfile = "hills.tif"\n\n[[zone]]\n',
-        ["terrain: this release does not plan by [terrain] yet; leave it out"],
-    ),
 }
 
 
