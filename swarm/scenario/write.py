@@ -22,7 +22,8 @@ def format_scenario(mission: Mission) -> str:
     """The text of a scenario file for ``mission``, with defaults left out.
 
     A mission whose numbers pass the limits of the format (see
-    swarm.scenario.shapes) is written all the same and refused when read.
+    swarm.scenario.shapes) is written all the same and refused when read. A mission over ground
+    knows the heights and not the file that they are from: it is written without ``[terrain]``.
     """
     areas, rest = _areas_and_other_tasks(mission)
     head: dict[str, object] = {"name": mission.name}

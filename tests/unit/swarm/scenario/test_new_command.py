@@ -21,6 +21,7 @@ from swarm.scenario.shapes import (
     OriginTable,
     Scenario,
     TaskTable,
+    TerrainTable,
     UavTable,
     ZoneTable,
 )
@@ -30,6 +31,7 @@ TABLES: dict[str, type[BaseModel]] = {
     "": Scenario,
     "mission": MissionTable,
     "origin": OriginTable,
+    "terrain": TerrainTable,
     "uav": UavTable,
     "base": BaseTable,
     "zone": ZoneTable,
@@ -105,6 +107,7 @@ def test_bases_zones_and_windows_in_comments_are_right_when_they_are_taken_in() 
         flags=re.MULTILINE,
     )
     text = text.replace("position_m = [60.0, 0.0]\n", "")  # for the line that takes its place
+    text = re.sub(r"^# \[terrain\]\n(# .*\n)+", "", text, flags=re.MULTILINE)  # it takes a file
 
     mission = parse_scenario(commented.sub(r"\1", text).encode(), "field.toml")
     (uav,), (base,), (zone,), (area,) = mission.uavs, mission.bases, mission.zones, mission.areas

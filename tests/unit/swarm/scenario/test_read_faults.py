@@ -14,7 +14,7 @@ HORIZON = "give a number > 0 and <= 1e9 [s], such as horizon_s = 600.0"
 SECONDS = "give a number >= 0 and <= 1e9 [s]"
 ALTITUDE = "give a height above mean sea level within -1e5..1e5 [m], such as 488.0"
 SCHEMA = "give schema = 1 or schema = 2"
-TOP_KEYS = "schema, name, mission, origin, uav, base, zone, area, task, tasks_from"
+TOP_KEYS = "schema, name, mission, origin, terrain, uav, base, zone, area, task, tasks_from"
 TASK_KEYS = (
     "id, position_m, lat_deg, lon_deg, alt_m, value, service_s, kind, appears_s, "
     "due_s, opens_s, closes_s, path_m, path, trigger_m, height_m"

@@ -21,7 +21,7 @@ from swarm.scenario.files import resolve_scenario, shipped_scenarios
 
 PLAIN = ["meadow", "orchard", "table-1", "valley-popups", "valley-survey"]
 """Those of schema 1."""
-NAMES = sorted([*PLAIN, "hayfield", "reservoir-inspection", "vineyard"])
+NAMES = sorted([*PLAIN, "hayfield", "reservoir-inspection", "ridge", "vineyard"])
 
 
 def shipped(name: str) -> Mission:
@@ -205,4 +205,6 @@ def test_reservoir_has_all_that_limits_fleets_in_the_field() -> None:
 def test_shipped_scenario_survives_being_written(name: str) -> None:
     mission = shipped(name)
 
-    assert parse_scenario(format_scenario(mission).encode(), name) == mission
+    # A mission knows the ground, but not the file that it is from.
+    flat = replace(mission, terrain=None)
+    assert parse_scenario(format_scenario(mission).encode(), name) == flat
