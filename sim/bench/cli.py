@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from sim.bench.area_commands import areas
 from sim.bench.command_line import (
     LONGEST_S,
     MarkdownOption,
@@ -217,6 +218,7 @@ def decide(
 
 bench.command("bound", short_help="Measure how close guided is proven.")(bound)
 bench.command("routes", short_help="Search published instances.")(routes)
+bench.command("areas", short_help="Cover areas, beside a fixed split.")(areas)
 bench.command("failover", short_help="Measure fleets in trouble.")(failover)
 bench.command("flood", short_help="Fly while a hostile peer floods the bus.")(flood)
 bench.command("missions", short_help="Fly many missions in virtual time.")(missions)

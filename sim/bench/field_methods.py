@@ -28,13 +28,15 @@ _HORIZON_FRAC = 1.2
 FieldSolver = SolverOf[FieldProblem]
 
 
-def bench_problem(n_uav: int, n_task: int, seed: int) -> FieldProblem:
-    """The random mission of `BENCH_SHAPE`, where every UAV succeeds for certain.
+def bench_problem(
+    n_uav: int, n_task: int, seed: int, shape: FieldShape = BENCH_SHAPE
+) -> FieldProblem:
+    """The random mission of ``shape``, where every UAV succeeds for certain.
 
     Then J can be stated by solvers that know no p for every UAV. D is 1.2 times what the mission
     takes by value per time.
     """
-    drawn = random_field_mission(n_uav, n_task, seed, BENCH_SHAPE, f"{n_uav}x{n_task}-{seed}")
+    drawn = random_field_mission(n_uav, n_task, seed, shape, f"{n_uav}x{n_task}-{seed}")
     mission = replace(drawn, uavs=tuple(replace(uav, success={}) for uav in drawn.uavs))
     horizon_s = _HORIZON_FRAC * field_span_s(mission)
     if not horizon_s > 0.0:

@@ -23,6 +23,8 @@ class FieldScore:
     """Tasks without due_s that are not done."""
     broken: int
     """Tasks on the lists from the first on that could not be done there; 0: flown as they are."""
+    begin_s: FloatArray
+    """(n_task,) when work begins [s]; NaN of what is not done."""
     end_s: FloatArray
     """(n_task,) when work ends [s]; NaN of what is not done."""
 
@@ -40,12 +42,13 @@ def score_in_field(problem: FieldProblem, lists: Sequence[Sequence[int]]) -> Fie
     if not flown.feasible:
         lists = optimise_lists(problem.kernel, state, iterations=0, lists=lists, threads=1).lists
         flown = fly_lists(problem.kernel, state, lists)
-    end_s = np.full(problem.n_task, np.nan)
+    work_s = np.full((problem.n_task, 2), np.nan)
     order = np.array([item for items in lists for item in items], dtype=np.int64)
     tasks = order >= 0
-    end_s[order[tasks] >> 1] = flown.times_s[tasks, 3]
+    work_s[order[tasks] >> 1] = flown.times_s[tasks, 2:]
+    begin_s, end_s = work_s.T
     left_out = int((problem.required & np.isnan(end_s)).sum())
-    return FieldScore(float(flown.value.sum()), left_out, broken, end_s)
+    return FieldScore(float(flown.value.sum()), left_out, broken, begin_s, end_s)
 
 
 def _tasks_done(lists: Sequence[Sequence[int]], done: Sequence[int]) -> int:

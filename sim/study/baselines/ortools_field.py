@@ -1,4 +1,4 @@
-"""Routing with OR-Tools under the field's constraints: batteries, bases, zones, windows, due times.
+"""Routing with OR-Tools in the field: batteries, bases, zones, windows, due times, lines.
 
 The whole model is written down in README.md beside this file. It states J and all limits but for
 what `LEFT_OUT` says; missions that it has no words for are refused by `refusal`. OR-Tools is an
@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from sim.study.baselines.ortools_routing import is_installed
 from swarm.allocation.field import FieldProblem
-from swarm.allocation.problem import FloatArray, IntArray
+from swarm.allocation.problem import BoolArray, FloatArray, IntArray
 
 LEFT_OUT = (
     "OR-Tools in the field: J is stated exactly, up to weights rounded to a 10000th of the largest "
@@ -47,8 +47,6 @@ def refusal(problem: FieldProblem) -> str | None:
         return "OR-Tools has no words for a p that depends on the UAV"
     if (problem.survival < 1.0).any():
         return "OR-Tools has no words for losses"
-    if problem.is_line.any():
-        return "its model here knows no lines"
     if (problem.full_s != problem.full_s[:1]).any():
         return "its model here knows one kind of battery"
     if ((problem.slots > 0) & (problem.slots < problem.n_uav)).any():
@@ -57,7 +55,11 @@ def refusal(problem: FieldProblem) -> str | None:
 
 
 def field_lists(
-    problem: FieldProblem, limit_s: float, start: Sequence[Sequence[int]] | None = None
+    problem: FieldProblem,
+    limit_s: float,
+    start: Sequence[Sequence[int]] | None = None,
+    *,
+    makespan: bool = False,
 ) -> tuple[tuple[int, ...], ...]:
     """Lists of items by guided local search; some may break limits by some milliseconds.
 
@@ -65,68 +67,85 @@ def field_lists(
         problem: a mission that `refusal` has nothing against.
         limit_s: of the search, which the building of the model precedes [s]; > 0.
         start: lists to begin with; its own first solution when None.
+        makespan: look for the earliest end of the last task, not for J.
 
     Returns:
         Items per UAV; all lists empty if it found no solution in time.
     """
     if not problem.n_uav or not problem.n_task:
         return ((),) * problem.n_uav
-    model = _Model(problem)
+    model = _Model(problem, makespan=makespan)
     return model.solved(limit_s, None if start is None else model.stated(start))
 
 
 @dataclass(frozen=True, slots=True)
 class _Stops:
-    """Nodes 1, 2, … of the model: every task, then every base several times."""
+    """Nodes 1, 2, … of the model: every task, lines once each way, then bases several times."""
 
-    task: IntArray
-    """(n_stop,) column; -1: a base."""
-    base: IntArray
-    """(n_stop,) number; -1: a task."""
-    place: IntArray
-    """(n_stop,) node of the problem."""
-    work_s: FloatArray
-    """(n_stop,) service or swap [s]."""
+    item: IntArray
+    """(n_stop,) item of a list; negative: a base."""
+    enter: IntArray
+    """(n_stop,) node of the problem where work begins."""
+    leave: IntArray
+    """(n_stop,) node of the problem where it ends."""
+
+    @property
+    def at_base(self) -> BoolArray:
+        """(n_stop,) whether it is a visit to a base."""
+        return self.item < 0
 
     @classmethod
     def of(cls, problem: FieldProblem) -> _Stops:
         """A visit to a base is a node, for it happens once; bases in turn."""
         tasks = np.flatnonzero(problem.capable.any(axis=0))
+        items = np.sort(np.concatenate([2 * tasks, 2 * tasks[problem.is_line[tasks]] + 1]))
+        items = items[np.isfinite(problem.line_s[:, items >> 1, items & 1]).any(axis=0)]
         swaps = bool(problem.n_base) and np.isfinite(problem.full_s).any()
         visits = np.arange(_VISITS_PER_UAV * problem.n_uav if swaps else 0) % max(1, problem.n_base)
+        at_bases, task, way = problem.n_uav + visits, items >> 1, items & 1
         return cls(
-            task=np.concatenate([tasks, np.full(len(visits), -1)]).astype(np.int32),
-            base=np.concatenate([np.full(len(tasks), -1), visits]).astype(np.int32),
-            place=np.concatenate([problem.enter[tasks, 0], problem.n_uav + visits]).astype(
-                np.int32
-            ),
-            work_s=np.concatenate([problem.service_s[tasks], problem.swap_s[visits]]),
+            item=np.concatenate([items, -1 - visits]).astype(np.int32),
+            enter=np.concatenate([problem.enter[task, way], at_bases]).astype(np.int32),
+            leave=np.concatenate([problem.enter[task, 1 - way], at_bases]).astype(np.int32),
+        )
+
+    def work_s(self, problem: FieldProblem, uav: int) -> FloatArray:
+        """(n_stop,) what that UAV is busy there: line and service, or swap [s]."""
+        task, way = self.item >> 1, self.item & 1
+        on_line_s = problem.line_s[problem.kind[uav]]
+        return np.where(
+            self.at_base,
+            np.append(problem.swap_s, 0.0)[np.where(self.at_base, -1 - self.item, -1)],
+            (problem.service_s + on_line_s.T)[way, np.maximum(task, 0)],
         )
 
 
 class _Model:
     """One mission as OR-Tools is told of it; solved once."""
 
-    def __init__(self, problem: FieldProblem) -> None:
+    def __init__(self, problem: FieldProblem, *, makespan: bool) -> None:
         from ortools.constraint_solver import pywrapcp
 
         self._problem = problem
         self._stops = stops = _Stops.of(problem)
         # Node 0 is every UAV's start, told apart by the matrices, and the end.
-        self._manager = pywrapcp.RoutingIndexManager(len(stops.task) + 1, problem.n_uav, 0)
+        self._manager = pywrapcp.RoutingIndexManager(len(stops.item) + 1, problem.n_uav, 0)
         self._routing = pywrapcp.RoutingModel(self._manager)
         weight = problem.weight.max(axis=0)
         self._weight_scale = _LARGEST_WEIGHT / max(float(weight.max()), 1e-300)
         self._weight = np.maximum(1.0, np.rint(weight * self._weight_scale)).astype(np.int64)
         self._add_times()
-        self._add_tasks()
+        self._add_tasks(delays_cost=not makespan)
+        if makespan:
+            span = int(self._weight.sum())
+            self._routing.GetDimensionOrDie("time").SetGlobalSpanCostCoefficient(span)
         if np.isfinite(problem.full_s).any():
             self._add_energy()
 
     def _add_times(self) -> None:
         """The cumul of a task is its end; arcs cost a share of what they delay."""
         problem, routing = self._problem, self._routing
-        transits, sum_s = [], np.zeros((len(self._stops.task) + 1,) * 2)
+        transits, sum_s = [], np.zeros((len(self._stops.item) + 1,) * 2)
         for uav in range(problem.n_uav):
             time_s = _times_s(problem, self._stops, uav)
             transits.append(routing.RegisterTransitMatrix(_ms(time_s).tolist()))
@@ -137,29 +156,36 @@ class _Model:
         longest = int(_LONGEST_SHARE * problem.horizon_s * _MS_PER_S)
         routing.AddDimensionWithVehicleTransits(transits, longest, longest, True, "time")
 
-    def _add_tasks(self) -> None:
+    def _add_tasks(self, *, delays_cost: bool) -> None:
         """Windows, what ends cost, and what it costs to leave tasks out; visits are free."""
-        problem, routing = self._problem, self._routing
+        problem, routing, stops = self._problem, self._routing, self._stops
         time = routing.GetDimensionOrDie("time")
         worth = self._weight * problem.until_s * _MS_PER_S
         dearest = int(worth.sum())
-        for node, task in enumerate(self._stops.task.tolist(), start=1):
+        either: dict[int, list[int]] = {}
+        for node, item in enumerate(stops.item.tolist(), start=1):
             index = self._manager.NodeToIndex(node)
-            if task < 0:
+            if item < 0:
                 routing.AddDisjunction([index], 0)
                 continue
+            task = item >> 1
+            either.setdefault(task, []).append(index)
+            on_line_s = np.minimum(problem.line_s[:, task, item & 1], _NO_WAY_S)
             service_s = float(problem.service_s[task])
-            first_s = float(problem.opens_s[task]) + service_s
-            last_s = min(float(problem.closes_s[task]) + service_s, float(problem.due_s[task]))
+            first_s = float(problem.opens_s[task]) + service_s + float(on_line_s.min())
+            last_s = float(problem.closes_s[task]) + service_s + float(on_line_s.max())
+            last_s = min(last_s, float(problem.due_s[task]))
             if first_s > 0.0:
                 time.CumulVar(index).SetMin(max(0, int(first_s * _MS_PER_S) - _LEEWAY_MS))
             if np.isfinite(last_s):
                 time.CumulVar(index).SetMax(int(last_s * _MS_PER_S) + _LEEWAY_MS)
-            time.SetCumulVarSoftUpperBound(index, 0, int(self._weight[task]))
+            if delays_cost:
+                time.SetCumulVarSoftUpperBound(index, 0, int(self._weight[task]))
             for uav in np.flatnonzero(~problem.capable[:, task]).tolist():
                 routing.VehicleVar(index).RemoveValue(uav)
+        for task, ways in either.items():
             required = bool(problem.required[task])
-            routing.AddDisjunction([index], int(worth[task]) + (dearest if required else 0))
+            routing.AddDisjunction(ways, int(worth[task]) + (dearest if required else 0))
 
     def _add_energy(self) -> None:
         """Its cumul is the airborne time since the last swap.
@@ -173,7 +199,7 @@ class _Model:
         transits = []
         for uav in range(problem.n_uav):
             used_ms = _ms(_used_s(problem, self._stops, uav))
-            used_ms[1:][self._stops.base >= 0] -= full_ms
+            used_ms[1:][self._stops.at_base] -= full_ms
             transits.append(routing.RegisterTransitMatrix(used_ms.tolist()))
         routing.AddDimensionWithVehicleTransits(transits, full_ms, full_ms, False, "energy")
         energy, time = routing.GetDimensionOrDie("energy"), routing.GetDimensionOrDie("time")
@@ -182,9 +208,9 @@ class _Model:
         for uav, index in enumerate(aloft):
             begun_ms = int((problem.full_s[uav] - problem.first_s[uav]) * _MS_PER_S)
             energy.CumulVar(index).SetRange(begun_ms, begun_ms)
-        for node, base in enumerate(self._stops.base.tolist(), start=1):
+        for node, item in enumerate(self._stops.item.tolist(), start=1):
             index = manager.NodeToIndex(node)
-            if base >= 0:
+            if item < 0:
                 energy.CumulVar(index).SetRange(full_ms, full_ms)
             else:
                 aloft.append(index)
@@ -192,9 +218,9 @@ class _Model:
             add(energy.SlackVar(index) >= time.SlackVar(index))
         # It waits for what opens, and not before bases or what is open.
         longest_ms = [0] * (routing.Size() + problem.n_uav)
-        for node, task in enumerate(self._stops.task.tolist(), start=1):
-            if task >= 0:
-                opens_ms = int(max(0.0, problem.opens_s[task]) * _MS_PER_S)
+        for node, item in enumerate(self._stops.item.tolist(), start=1):
+            if item >= 0:
+                opens_ms = int(max(0.0, problem.opens_s[item >> 1]) * _MS_PER_S)
                 longest_ms[manager.NodeToIndex(node)] = opens_ms
         for index in range(routing.Size()):
             longest = routing.solver().Element(longest_ms, routing.NextVar(index))
@@ -202,17 +228,16 @@ class _Model:
 
     def stated(self, lists: Sequence[Sequence[int]]) -> list[list[int]]:
         """Nodes of lists of items, as far as there are enough visits to bases."""
-        node = {task: n for n, task in enumerate(self._stops.task.tolist(), start=1) if task >= 0}
         visits: dict[int, list[int]] = {}
-        for n, base in enumerate(self._stops.base.tolist(), start=1):
-            visits.setdefault(base, []).append(n)
+        for node, item in enumerate(self._stops.item.tolist(), start=1):
+            visits.setdefault(item, []).append(node)
         stated: list[list[int]] = []
         for items in lists:
             stated.append([])
             for item in items:
-                if item < 0 and not visits.get(-1 - item):
+                if not visits.get(item):
                     break
-                stated[-1].append(node[item >> 1] if item >= 0 else visits[-1 - item].pop(0))
+                stated[-1].append(visits[item].pop(0))
         return stated
 
     def solved(self, limit_s: float, start: list[list[int]] | None) -> tuple[tuple[int, ...], ...]:
@@ -233,9 +258,7 @@ class _Model:
         routing, items = self._routing, list[int]()
         index = solution.Value(routing.NextVar(routing.Start(uav)))
         while not routing.IsEnd(index):
-            stop = self._manager.IndexToNode(index) - 1
-            task, base = int(self._stops.task[stop]), int(self._stops.base[stop])
-            items.append(2 * task if task >= 0 else -1 - base)
+            items.append(int(self._stops.item[self._manager.IndexToNode(index) - 1]))
             index = solution.Value(routing.NextVar(index))
         while items and items[-1] < 0:
             items.pop()
@@ -248,19 +271,19 @@ def _times_s(problem: FieldProblem, stops: _Stops, uav: int) -> FloatArray:
     Row 0 is the UAV's start, column 0 the end of its list, which takes no time.
     """
     leg_s = problem.leg_s[problem.kind[uav]]
-    time_s = np.zeros((len(stops.place) + 1,) * 2)
-    time_s[0, 1:] = leg_s[uav, stops.place]
-    time_s[1:, 1:] = leg_s[np.ix_(stops.place, stops.place)]
-    time_s[:, 1:] += stops.work_s
+    time_s = np.zeros((len(stops.item) + 1,) * 2)
+    time_s[0, 1:] = leg_s[uav, stops.enter]
+    time_s[1:, 1:] = leg_s[np.ix_(stops.leave, stops.enter)]
+    time_s[:, 1:] += stops.work_s(problem, uav)
     return time_s
 
 
 def _used_s(problem: FieldProblem, stops: _Stops, uav: int) -> FloatArray:
     """The same in the air: no swaps, and column 0 is the way home [s]."""
     used_s = _times_s(problem, stops, uav)
-    used_s[:, 1:] -= np.where(stops.base >= 0, stops.work_s, 0.0)
-    used_s[1:, 0] = problem.home_s[uav, stops.place]
-    used_s[1:, 0][stops.base >= 0] = 0.0
+    used_s[:, 1:] -= np.where(stops.at_base, stops.work_s(problem, uav), 0.0)
+    used_s[1:, 0] = problem.home_s[uav, stops.leave]
+    used_s[1:, 0][stops.at_base] = 0.0
     return used_s
 
 
