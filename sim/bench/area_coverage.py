@@ -23,7 +23,7 @@ class FlownLine:
     """When it was done [s mission time]."""
 
 
-class Ground:
+class SurveyedGround:
     """All that is to be covered in a mission, as one piece."""
 
     def __init__(self, mission: Mission) -> None:
@@ -57,7 +57,7 @@ class CoverageCurve:
     """(n,) what it and all that ended before cover."""
 
     @classmethod
-    def of(cls, ground: Ground, lines: Iterable[FlownLine]) -> CoverageCurve:
+    def of(cls, ground: SurveyedGround, lines: Iterable[FlownLine]) -> CoverageCurve:
         """That of lines, each flown once."""
         rows = sorted(lines, key=lambda line: (line.end_s, line.task))
         flown = [line.task for line in rows]

@@ -15,7 +15,7 @@ import numpy as np
 
 from coordinator.planner.options import after_time
 from coordinator.planner.plan import make_plan
-from sim.bench.area_coverage import FlownLine, Ground
+from sim.bench.area_coverage import FlownLine, SurveyedGround
 from sim.bench.field_methods import index_lists
 from sim.bench.field_score import score_in_field
 from sim.study.baselines import ortools_field
@@ -88,7 +88,7 @@ class AreaCase:
         lines = tuple(line for area in self.areas for line in area)
         self.mission = replace(mission, tasks=lines)
         self.problem = FieldProblem.from_mission(self.mission)
-        self.ground = Ground(self.mission)
+        self.ground = SurveyedGround(self.mission)
         self.strips = strips(self.problem, self.areas)
         self.times = times
         self._clock = clock

@@ -14,6 +14,7 @@ namespace peckorder {
 namespace {
 
 constexpr double kSameM = 1e-6;  // heights that differ by less are the same
+constexpr double kAboveM = 0.05;  // what keeps a path from the ground is that far above it at most
 
 // A place along a path: how far it is, and how high.
 struct Mark {
@@ -85,14 +86,25 @@ class Profile {
             const auto up_at = [&](double share) {
                 return cell.at(within(u0 + share * du, most_u), within(v0 + share * dv, most_v));
             };
-            const double from = up_at(a), to = up_at(b);
-            add(begin_m + a * piece_m, from);
             // A straight line across a bilinear cell is a parabola, under the hull of its ends and
-            // of the point where its tangents meet. Beyond the edges it is straight.
+            // of the point where its tangents meet; in parts, that point is not far above it.
+            // Beyond the edges it is straight.
             const bool inside = u == within(u, most_u) && v == within(v, most_v);
             const double bend = inside ? cell.twist() * du * dv * (b - a) * (b - a) : 0.0;
-            if (bend < 0.0) add(begin_m + middle * piece_m, (from + to - bend) / 2.0);
-            add(begin_m + b * piece_m, to);
+            const int parts = bend < 0.0 ? int(std::ceil(std::sqrt(-bend / (4.0 * kAboveM)))) : 1;
+            double here = a, from = up_at(a);
+            add(begin_m + a * piece_m, from);
+            for (int part = 1; part <= parts; ++part) {
+                const double there = part == parts ? b : a + (b - a) * part / parts;
+                const double to = up_at(there), part_bend = bend / (double(parts) * parts);
+                if (bend < 0.0) {
+                    const double meet = (here + there) / 2.0;
+                    add(begin_m + meet * piece_m, (from + to - part_bend) / 2.0);
+                }
+                add(begin_m + there * piece_m, to);
+                here = there;
+                from = to;
+            }
         }
     }
 
@@ -191,6 +203,11 @@ void drape(const Ground& ground, const double* place_m, int n, double begin_up_m
     }
     int corner = 1;
     const auto place_at = [&](double at_m) {
+        if (at_m <= kSameM) return GroundPoint{place_m[0], place_m[1], 0.0};
+        if (at_m >= length_m - kSameM) {
+            const double* last = place_m + 2 * std::size_t(n - 1);
+            return GroundPoint{last[0], last[1], 0.0};
+        }
         while (corner + 1 < n && along_m[corner] < at_m) ++corner;
         const double piece_m = along_m[corner] - along_m[corner - 1];
         const double share = piece_m > 0.0 ? (at_m - along_m[corner - 1]) / piece_m : 0.0;

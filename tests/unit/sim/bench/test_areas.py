@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import shapely
 
-from sim.bench.area_coverage import CoverageCurve, FlownLine, Ground
+from sim.bench.area_coverage import CoverageCurve, FlownLine, SurveyedGround
 from sim.bench.area_methods import METHODS, AreaCase, Loss, SearchTimes
 from sim.bench.areas import ONE_LOSS, UNDISTURBED, AreasBench, measure_areas
 from swarm.cli import main
@@ -36,7 +36,7 @@ def one_after_another(mission: Mission) -> list[FlownLine]:
 
 def test_the_curve_is_what_is_flown_over_and_exact_between_lines() -> None:
     mission = paddock()
-    ground, lines = Ground(mission), one_after_another(mission)
+    ground, lines = SurveyedGround(mission), one_after_another(mission)
 
     curve = CoverageCurve.of(ground, reversed(lines))
 
@@ -71,14 +71,14 @@ def _covered(
 
 def test_the_time_is_that_of_the_line_with_which_enough_is_covered() -> None:
     mission = paddock()
-    curve = CoverageCurve.of(Ground(mission), one_after_another(mission))
+    curve = CoverageCurve.of(SurveyedGround(mission), one_after_another(mission))
 
     assert curve.reached_s(0.995) == 13.0 * 12
     assert curve.reached_s(0.45) == 13.0 * 6  # five cover 5/12 and what is a metre beyond
     assert curve.reached_s(0.0) == 13.0
-    partly = CoverageCurve.of(Ground(mission), one_after_another(mission)[:5])
+    partly = CoverageCurve.of(SurveyedGround(mission), one_after_another(mission)[:5])
     assert partly.reached_s(0.995) is None
-    nothing = CoverageCurve.of(Ground(mission), [])
+    nothing = CoverageCurve.of(SurveyedGround(mission), [])
     assert (nothing.covered, nothing.makespan_s, nothing.mean(10.0)) == (0.0, 0.0, 0.0)
     with pytest.raises(ValueError, match="until_s must be >= 156"):
         curve.mean(100.0)
@@ -86,7 +86,7 @@ def test_the_time_is_that_of_the_line_with_which_enough_is_covered() -> None:
 
 def test_areas_count_by_their_size() -> None:
     mission = paddock(areas=(SQUARE, EAST))
-    ground = Ground(mission)
+    ground = SurveyedGround(mission)
 
     east = [TaskId("field2-01"), TaskId("field2-02")]
 
