@@ -72,6 +72,9 @@ _HEEDS_S = 2.0
 """So late at most a vehicle begins to brake for a zone that is new: news of it, the order and the
 place that it tells take their time."""
 
+_BRAKES_S = 60.0
+"""No vehicle brakes for longer, whatever acceleration is told of it."""
+
 
 class VehicleSession(Conversation):
     """One vehicle, as far as it is heard; and what was made of it in the step under way."""
@@ -254,7 +257,8 @@ class VehicleSession(Conversation):
         if place_enu_m is None or position is None:
             return None
         east_m_s, north_m_s, _ = position.velocity_enu_m_s
-        lasts_s = heeds_s + math.hypot(east_m_s, north_m_s) / (2.0 * self.acceleration_m_s2)
+        brakes_s = math.hypot(east_m_s, north_m_s) / self.acceleration_m_s2
+        lasts_s = heeds_s + min(brakes_s, _BRAKES_S) / 2.0
         east_m, north_m, up_m = place_enu_m
         return place_enu_m, (east_m + lasts_s * east_m_s, north_m + lasts_s * north_m_s, up_m)
 

@@ -98,6 +98,17 @@ _LEAP_M = 25.0
 _FAKES: dict[type, type[FakeCopter]] = {ArduCopter: FakeCopter, Px4Copter: FakePx4}
 
 
+def _is_of_fence(message: Any) -> bool:
+    """Whether it is about the vehicle's own fence, which moves nothing."""
+    match message.get_type():
+        case "PARAM_REQUEST_READ":
+            return True
+        case "COMMAND_LONG":
+            return bool(message.command == mavlink.MAV_CMD_DO_FENCE_ENABLE)
+        case _:
+            return getattr(message, "mission_type", None) == mavlink.MAV_MISSION_TYPE_FENCE
+
+
 @dataclass(frozen=True, slots=True)
 class _Task:
     """What a bridge has been ordered to do."""
@@ -247,7 +258,8 @@ class BridgeWatch:
         if name in ("PARAM_REQUEST_READ", "PARAM_SET") and message.param_id in self.fake.jerk_names:
             self._see_jerk(message)
             return
-        hold(not self._silent, f"{name} after a hand-over: {message}")
+        fences = self._heard_again and _is_of_fence(message)  # it is ours, without an order yet
+        hold(fences or not self._silent, f"{name} after a hand-over: {message}")
         if getattr(message, "mission_type", 0) == FENCE:
             places_m = [*self._heres_m, *self._task.told_m]
             self._zones.see_fence(name, message, phases, places_m)
