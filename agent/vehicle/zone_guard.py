@@ -77,6 +77,8 @@ class ZoneGuard:
         Args:
             path_enu_m: from where it is, corner by corner, to where it stops [m].
         """
+        if not all(math.isfinite(each) for place in path_enu_m for each in place):
+            return "it leads to no place"
         for number, (here, there) in enumerate(pairwise(path_enu_m)):
             for zone, obstacles in self._zones:
                 if not zone.concerns(*sorted((here[2], there[2]))):
