@@ -106,7 +106,7 @@ def _is_of_fence(message: Any) -> bool:
         case "COMMAND_LONG":
             return bool(message.command == mavlink.MAV_CMD_DO_FENCE_ENABLE)
         case _:
-            return getattr(message, "mission_type", None) == mavlink.MAV_MISSION_TYPE_FENCE
+            return bool(getattr(message, "mission_type", None) == mavlink.MAV_MISSION_TYPE_FENCE)
 
 
 @dataclass(frozen=True, slots=True)
