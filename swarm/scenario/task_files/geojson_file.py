@@ -58,7 +58,7 @@ def read_geojson(text: str, request: ReadOptions) -> TaskFile:
         place = f"features[{index}]"
         try:
             shapes = list(_shapes(member(feature, "geometry"), f"{place}.geometry"))
-        except _Misshapen as error:
+        except _MisshapenError as error:
             found.append(Fault(request.source, error.place, error.problem, error.remedy))
             continue
         found += reader.entries(_feature(feature, place, shapes))
@@ -77,7 +77,7 @@ def _feature(value: object, place: str, shapes: Sequence[Shape]) -> Feature:
     return Feature(place, shapes, named, name)
 
 
-class _Misshapen(Exception):  # noqa: N818 - it is no error of ours
+class _MisshapenError(Exception):
     """A geometry is not as it should be."""
 
     def __init__(self, place: str, problem: str, remedy: str) -> None:
@@ -108,7 +108,7 @@ def _shapes(geometry: object, place: str, *, inner: bool = False) -> Iterator[Sh
             yield _shape(form, part, f"{where}[{index}]")
     else:
         problem = f"{shown(kind)} is nothing to fly to" if kind else "has no geometry"
-        raise _Misshapen(place, problem, _GIVE)
+        raise _MisshapenError(place, problem, _GIVE)
 
 
 def _shape(form: Form, coordinates: object, place: str) -> Shape:
@@ -128,7 +128,9 @@ def _shape(form: Form, coordinates: object, place: str) -> Shape:
 def _array(value: object, place: str, form: Form) -> Sequence[object]:
     if not isinstance(value, list) or not value:
         nested = "[" * _DEPTH[form] + "…" + "]" * _DEPTH[form]
-        raise _Misshapen(place, "is not an array of coordinates", f"give {nested} of positions")
+        raise _MisshapenError(
+            place, "is not an array of coordinates", f"give {nested} of positions"
+        )
     return value
 
 
@@ -136,12 +138,12 @@ def _positions(value: object, place: str, form: Form) -> list[Place]:
     positions = _array(value, place, form)
     if len(positions) > MOST_POINTS:
         problem = f"has {len(positions)} points"
-        raise _Misshapen(place, problem, f"simplify it to {MOST_POINTS} or fewer")
+        raise _MisshapenError(place, problem, f"simplify it to {MOST_POINTS} or fewer")
     return [_position(each, f"{place}[{index}]") for index, each in enumerate(positions)]
 
 
 def _position(value: object, place: str) -> Place:
     position = place_of(value) if isinstance(value, list) else None
     if position is None:
-        raise _Misshapen(place, "is not an array of 2 or 3 numbers", _POSITION)
+        raise _MisshapenError(place, "is not an array of 2 or 3 numbers", _POSITION)
     return position

@@ -9,6 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import rasterio
+from rasterio import Affine
+from rasterio.warp import transform
 
 from swarm.allocation.legs.ground import ground_of
 from swarm.model import Mission
@@ -69,9 +72,6 @@ def tile(void: bool = False) -> bytes:
 
 
 def geotiff(path: Path, heights_m: Any, **given: Any) -> None:
-    rasterio = pytest.importorskip("rasterio")
-    from rasterio import Affine
-
     heights = np.asarray(heights_m, dtype=given.pop("dtype", "float32"))
     heights = heights.reshape(-1, *heights.shape[-2:])
     profile = {
@@ -130,10 +130,6 @@ def test_a_geotiff_in_degrees_is_taken_as_it_is(tmp_path: Path) -> None:
 
 
 def test_no_pixel_of_a_projected_or_fine_geotiff_rises_above_the_ground(tmp_path: Path) -> None:
-    pytest.importorskip("rasterio")
-    from rasterio import Affine
-    from rasterio.warp import transform
-
     rng = np.random.default_rng(3)
     x, y = transform("EPSG:4326", "EPSG:32632", [8.5], [47.4])
     side = 700
@@ -180,7 +176,6 @@ def test_hostile_archives_are_one_line(tmp_path: Path) -> None:
 
 
 def test_what_is_wrong_with_a_geotiff_is_one_line(tmp_path: Path) -> None:
-    pytest.importorskip("rasterio")
     (tmp_path / "text.tif").write_text("<VRTDataset rasterXSize='1' rasterYSize='1'/>")
     assert "is no GeoTIFF that can be read" in fault(tmp_path, "text.tif")
     geotiff(tmp_path / "bare.tif", wgs84_slope(), crs=None)
