@@ -39,6 +39,8 @@ _MOST_BLOCK = 2**28
 """Bytes of a block, which is read as a whole."""
 _HIGHEST_M = 12_000.0
 """Nothing on Earth is farther from the sea level."""
+_PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
+"""How tiles in archives may be packed."""
 _HGT_SIDES = (1201, 3601)
 _HGT_VOID = -32768
 _TILE = re.compile(r"([NS])(\d\d)([EW])(\d\d\d)", re.IGNORECASE)
@@ -113,7 +115,7 @@ def read_terrain(path: Path, origin: Origin, around: Box, clearance_m: float) ->
         return _terrain(raster, origin, around, frame, count, clearance_m)
     except _UnusableError as error:
         raise InputError(Fault(source, "", error.problem, error.remedy)) from error
-    except (OSError, EOFError, zlib.error, zipfile.BadZipFile) as error:
+    except (OSError, EOFError, zlib.error, zipfile.BadZipFile, NotImplementedError) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         fault = Fault(source, "", f"cannot be read: {printable(reason)}", "give a readable file")
         raise InputError(fault) from error
@@ -171,6 +173,8 @@ def _hgt_bytes(path: Path) -> bytes:
             raise _UnusableError(f"has {len(names)} tiles in it", "give one with one .hgt in it")
         if archive.getinfo(names[0]).flag_bits & 1:
             raise _UnusableError("is locked by a password", "give it unlocked")
+        if (method := archive.getinfo(names[0]).compress_type) not in _PLAIN:
+            raise _UnusableError(f"is packed by method {method}", "pack it by deflate")
         with archive.open(names[0]) as member:
             return _some(member)
 

@@ -169,6 +169,16 @@ def test_hostile_archives_are_one_line(tmp_path: Path) -> None:
     assert "are no SRTM tile" in fault(tmp_path, "N47E008.hgt.zip")
     zipped(tmp_path / "N47E009.hgt.zip", "readme.txt", b"")
     assert "0 tiles" in fault(tmp_path, "N47E009.hgt.zip")
+    with zipfile.ZipFile(tmp_path / "N47E011.hgt.zip", "w", zipfile.ZIP_LZMA) as archive:
+        archive.writestr("N47E011.hgt", tile())
+    assert "is packed by method 14; pack it by deflate" in fault(tmp_path, "N47E011.hgt.zip")
+    newer = (
+        (tmp_path / "N47E009.hgt.zip")
+        .read_bytes()
+        .replace(b"PK\x01\x02\x14\x03\x14", b"PK\x01\x02\x14\x03\xff")
+    )
+    (tmp_path / "N47E012.hgt.zip").write_bytes(newer)
+    assert "cannot be read: zip file version" in fault(tmp_path, "N47E012.hgt.zip")
     (tmp_path / "N47E010.hgt.zip").write_bytes(b"PK\x03\x04 no archive")
     assert "cannot be read" in fault(tmp_path, "N47E010.hgt.zip")
     (tmp_path / "N47E011.hgt.gz").write_bytes(gzip.compress(tile())[:-20])
