@@ -17,7 +17,7 @@ from agent.core.decision import DIVERSION_MARGIN_FRAC, DecisionTurn
 from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.rules import FIELD_INDEX_RULES, FIELD_RULES, GUIDED, item_lists
 from swarm.kernels.field import FieldRuleCode, fly_lists, run_rule
-from swarm.kernels.field_search import SearchedLists, optimise_lists
+from swarm.kernels.field_search import Effort, SearchedLists, optimise_lists
 from swarm.model import BaseId, TaskId
 from swarm.protocol.board import TaskBoard, claim_strength, ranks
 from swarm.protocol.field_board import field_state, last_node
@@ -27,6 +27,10 @@ _SEED = 0
 """Of the search of every decision: the same state gives the same lists everywhere."""
 _RULES = {**FIELD_RULES, **FIELD_INDEX_RULES}
 _ITERATIONS_PER_TASK, _FEWEST_ITERATIONS, _MOST_ITERATIONS = 20, 50, 250
+_STEPS = 600_000
+"""Of a decision, some 30 ms: who decides hears and says nothing meanwhile."""
+_ITERATIONS_PER_MISSING_TASK = 2
+"""Spent even so: two lanes share them, and each places one missing task at a time."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,12 +176,15 @@ def _searched(
     Where batteries are swapped follows from the order of the tasks.
     """
     begin = item_lists(problem, rule.routes) if lists is None else lists
-    most = _ITERATIONS_PER_TASK * int(np.count_nonzero(state.open))
+    n_open = int(np.count_nonzero(state.open))
+    listed = sum(item >= 0 and bool(state.open[item >> 1]) for items in begin for item in items)
+    most = min(_MOST_ITERATIONS, max(_FEWEST_ITERATIONS, _ITERATIONS_PER_TASK * n_open))
     return optimise_lists(
         problem.kernel,
         state,
         seed=_SEED,
-        iterations=min(_MOST_ITERATIONS, max(_FEWEST_ITERATIONS, most)),
+        iterations=most,
+        effort=Effort(_STEPS, min(most, _ITERATIONS_PER_MISSING_TASK * (n_open - listed))),
         lists=begin,
         threads=1,
     )

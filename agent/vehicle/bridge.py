@@ -82,6 +82,10 @@ class Bridge:
         self._heartbeat_at_s = -math.inf
         self._raises_jerk = False
         self._next_deadline_s = -math.inf
+        self._kept: GoTo | None = None
+        """An order that is obeyed once it is known where the vehicle is."""
+        self._kept_until_s = math.inf
+        """When it is obeyed even so, and refused."""
         self._stall_detector = StallDetector(config.silence_timeout_s / 2.0)
 
     @property
@@ -127,7 +131,12 @@ class Bridge:
             case BytesReceived(data, source):
                 for heard in session.codec.decode(data, source, now_s):
                     self._hear(heard)
+            case GoTo() if self._activity.in_our_hands and not session.is_placed:
+                # Told in a moment: an agent that was held up has heard no position meanwhile.
+                self._kept, self._kept_until_s = event, now_s + self.config.position_timeout_s
             case Prepare() | GoTo() | Swap() | Hold() | Return() | Ready() | KeepOut():
+                if not isinstance(event, Ready | KeepOut):
+                    self._kept = None
                 self._activity = obey(self._activity, event, session)
             case LinkOpened():
                 session.contact.link_up = True
@@ -138,10 +147,18 @@ class Bridge:
                 session.contact.link_up = False
             case TimePassed():
                 pass
+        self._obey_kept()
         self._advance()
         self._next_deadline_s = self._earliest_deadline_s()
         self._stall_detector.expect_by(self._next_deadline_s)
         return session.take_actions()
+
+    def _obey_kept(self) -> None:
+        session, kept = self._session, self._kept
+        if kept is None or not (session.is_placed or session.now_s >= self._kept_until_s):
+            return
+        self._kept = None
+        self._activity = obey(self._activity, kept, session)
 
     def next_deadline_s(self) -> float:
         """When to step with `TimePassed` if nothing else happens before."""
@@ -156,6 +173,8 @@ class Bridge:
         ]
         if (commands_s := session.commands.next_deadline_s()) is not None:
             deadlines_s.append(commands_s)
+        if self._kept is not None:
+            deadlines_s.append(self._kept_until_s)
         silent_at_s = session.vehicle.silent_at_s(self.config.silence_timeout_s)
         if silent_at_s is not None and session.now_s < silent_at_s and activity.in_our_hands:
             deadlines_s.append(silent_at_s)

@@ -18,7 +18,7 @@ from coordinator.mission_view.observed_flights import ObservedFlights
 from swarm.allocation import field
 from swarm.allocation.field.rules import item_lists
 from swarm.kernels.field import fly_lists
-from swarm.kernels.field_search import optimise_lists
+from swarm.kernels.field_search import Effort, optimise_lists
 from swarm.model import BaseId, Mission
 from swarm.model.plan import ScheduleEntry, at_base
 from swarm.protocol.bases import blocking
@@ -29,7 +29,7 @@ from swarm.protocol.uav_messages import Claim, ClaimPhase
 MapPath = tuple[MapPoint, ...]
 
 
-_ITERATIONS = 200
+_ITERATIONS, _EFFORT = 200, Effort(600_000)
 """Of the search from the epoch's lists: about what a decision spends."""
 
 
@@ -107,7 +107,7 @@ class FleetWays:
             state.free_s[row] = max(state.free_s[row], mission_s)
         begin = item_lists(problem, epoch.routes)
         found = optimise_lists(
-            problem.kernel, state, iterations=_ITERATIONS, lists=begin, threads=1
+            problem.kernel, state, iterations=_ITERATIONS, effort=_EFFORT, lists=begin, threads=1
         )
         home = fly_lists(problem.kernel, state, found.lists).home.tolist()
         return [

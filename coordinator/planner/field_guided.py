@@ -14,9 +14,11 @@ from coordinator.planner.options import Limit, ShouldStop
 from coordinator.planner.sequence_search import Progress
 from swarm.allocation.field.problem import FieldProblem
 from swarm.allocation.field.state import FieldState
-from swarm.kernels.field_search import optimise_lists
+from swarm.kernels.field_search import Effort, optimise_lists
 
 _ITERATIONS_PER_TASK, _FEWEST_ITERATIONS, _MOST_ITERATIONS = 400, 4_000, 100_000
+_SEARCH = Effort(150_000_000)
+"""Without a limit: some seconds on two processors. Who waits for the plan may be in the air."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,7 @@ def field_guided_plan(
     progress: Progress | None = None,
     state: FieldState | None = None,
     lists: Sequence[Sequence[int]] | None = None,
+    effort: Effort | None = None,
     threads: int | None = None,
 ) -> FieldGuidedPlan:
     """Optimise lists until stopped; never worse than those it begins with.
@@ -64,6 +67,7 @@ def field_guided_plan(
         progress: told the iterations and the best J so far after each slice of work.
         state: where the team stands; at its start when None.
         lists: of items, to begin with, such as those now published.
+        effort: after which it ends even so; without a `Limit` a few seconds' worth when None.
         threads: as many as there are processors when None; does not change the result.
     """
     state = FieldState.at_start(problem) if state is None else state
@@ -72,6 +76,7 @@ def field_guided_plan(
         state,
         seed=seed,
         spent_frac=_spent_frac(problem.n_task, stop),
+        effort=_SEARCH if effort is None and not isinstance(stop, Limit) else effort,
         lists=lists,
         progress=progress,
         threads=threads,

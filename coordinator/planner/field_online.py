@@ -19,6 +19,7 @@ from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.rules import FIELD_RULES, GUIDED, item_lists
 from swarm.kernels.field import fly_lists, run_rule
 from swarm.kernels.field_alone import earliest_alone
+from swarm.kernels.field_search import Effort
 from swarm.model.plan import by_reason
 from swarm.protocol.bases import blocking
 from swarm.protocol.board import TaskBoard
@@ -28,7 +29,9 @@ from swarm.protocol.uav_messages import Claim
 Items = Sequence[Sequence[int]]
 """Lists of items, one of each UAV."""
 _SEARCH_ITERATIONS_PER_TASK = 100
-_GOING_ON_ITERATIONS = 200
+_SEARCH = Effort(60_000_000)
+"""Of that search, some two seconds on one processor."""
+_GOING_ON_ITERATIONS, _GOING_ON_STEPS = 200, 600_000
 """About what a decision online spends."""
 _ITERATIONS_PER_MISSING_TASK = 2
 """Beside these: two lanes share them, and each places one missing task at a time."""
@@ -141,6 +144,7 @@ def planned_anew(
         stop=first_of(stop, most),
         state=standing.state,
         lists=begin,
+        effort=_SEARCH,
         threads=threads,
     )
     return _course(standing, plan.lists)
@@ -164,12 +168,14 @@ def left_out_by(
 def _searched(standing: FieldStanding, begin: Items, stop: ShouldStop = never) -> FieldCourse:
     listed = sum(item >= 0 for items in begin for item in items)
     missing = max(0, int(np.count_nonzero(standing.state.open)) - listed)
-    most = _GOING_ON_ITERATIONS + _ITERATIONS_PER_MISSING_TASK * missing
+    placing = _ITERATIONS_PER_MISSING_TASK * missing
+    most = _GOING_ON_ITERATIONS + placing
     plan = field_guided_plan(
         standing.problem,
         stop=first_of(stop, after_evaluations(most)),
         state=standing.state,
         lists=begin,
+        effort=Effort(_GOING_ON_STEPS, placing),
         threads=1,
     )
     return _course(standing, plan.lists)

@@ -490,7 +490,8 @@ void FieldLane::iterate(double temperature) {
 }
 
 FieldSearch::FieldSearch(const FieldProblem& problem, const FieldTeam& team,
-                         const ItemLists& lists, std::uint64_t seed) {
+                         const ItemLists& lists, std::uint64_t seed)
+    : work_(kLanes, 0) {
     Random random(seed);
     for (int lane = 0; lane < kLanes; ++lane) {
         lanes_.push_back(std::make_unique<FieldLane>(problem, team, random.bits()));
@@ -511,7 +512,9 @@ void FieldSearch::round(long iterations, double heat, int threads, Watch& watch)
             for (long k = 0; k < iterations; ++k) {
                 const std::int64_t before = lane.steps();
                 lane.iterate(temperature);
-                if (watch.stops_after(2 * (lane.steps() - before) + 50)) return;
+                const std::int64_t work = 2 * (lane.steps() - before) + 50;
+                work_[number] += work;
+                if (watch.stops_after(work)) return;
             }
         };
     });
@@ -520,6 +523,10 @@ void FieldSearch::round(long iterations, double heat, int threads, Watch& watch)
         best_worth_ = lane->best_worth();
         best_ = lane->best();
     }
+}
+
+std::int64_t FieldSearch::work() const {
+    return std::accumulate(work_.begin(), work_.end(), std::int64_t{0});
 }
 
 void FieldSearch::gather() {

@@ -147,11 +147,17 @@ class FieldSearch {
     void gather();
 
     int n_lane() const { return static_cast<int>(lanes_.size()); }
+
+    // Of all lanes in all rounds, in steps as a Watch counts them; the same with any number of
+    // threads.
+    std::int64_t work() const;
+
     const ItemLists& best() const { return best_; }
     const Worth& best_worth() const { return best_worth_; }
 
   private:
     std::vector<std::unique_ptr<FieldLane>> lanes_;
+    std::vector<std::int64_t> work_;  // of each lane
     ItemLists best_;
     Worth best_worth_;
 };

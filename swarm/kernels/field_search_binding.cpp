@@ -47,6 +47,7 @@ class BoundFieldSearch {
     }
 
     int n_lane() const { return search_->n_lane(); }
+    std::int64_t work() const { return search_->work(); }
     std::pair<int, double> best_worth() const {
         return {search_->best_worth().left_out, search_->best_worth().value};
     }
@@ -91,6 +92,7 @@ void bind_field_search(nb::module_& module) {
              nb::arg("threads"), nb::arg("should_stop") = nb::none())
         .def("gather", &BoundFieldSearch::gather)
         .def("n_lane", &BoundFieldSearch::n_lane)
+        .def("work", &BoundFieldSearch::work)
         .def("best_worth", &BoundFieldSearch::best_worth)
         .def("best", &BoundFieldSearch::best);
 }

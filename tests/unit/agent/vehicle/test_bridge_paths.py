@@ -55,6 +55,28 @@ def test_no_straight_line_through_a_zone_is_flown(flight: BridgeFlight) -> None:
     assert len(flight.copter.heard) == before
 
 
+def test_an_order_is_kept_until_it_is_known_where_the_vehicle_is(flight: BridgeFlight) -> None:
+    flight.now_s += 4.0  # its program was held up, and has read nothing meanwhile
+    assert flight.order(GoTo(1, BEHIND, via_enu_m=ROUND)) == []
+    flight.run_until(Arrived(1), limit_s=120.0)
+    assert not any(isinstance(report, Refused) for report in flight.reports)
+
+
+def test_an_order_is_not_kept_for_long_nor_once_there_is_another(flight: BridgeFlight) -> None:
+    lost = GoTo(1, BEHIND, via_enu_m=ROUND)
+    position = flight.to_bridge
+    flight.to_bridge = lambda _: []
+    flight.run(3.5)
+    flight.order(lost)
+    flight.order(GoTo(2, BEHIND, via_enu_m=ROUND))
+    refused = flight.run_until(Refused, limit_s=30.0)
+    assert isinstance(refused, Refused)
+    assert refused.order == GoTo(2, BEHIND, via_enu_m=ROUND)
+    flight.to_bridge = position
+    flight.run(20.0)
+    assert lost not in [each.order for each in flight.reports if isinstance(each, Refused)]
+
+
 def test_corners_may_not_lead_through_one_either(flight: BridgeFlight) -> None:
     order = GoTo(1, (60.0, 0.0, 10.0), via_enu_m=((17.0, 35.0, 10.0), (24.0, 0.0, 10.0)))
 

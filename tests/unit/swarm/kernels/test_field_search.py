@@ -10,7 +10,7 @@ import pytest
 from swarm.allocation.field.problem import FieldProblem
 from swarm.allocation.field.state import FieldState
 from swarm.kernels.field import fly_lists
-from swarm.kernels.field_search import optimise_lists
+from swarm.kernels.field_search import Effort, optimise_lists
 from tests.support.field_dilemmas import dilemma
 from tests.support.field_missions import mission_of
 from tests.support.field_oracle.made_up import made_up
@@ -49,6 +49,34 @@ def test_progress_never_falls(problem: FieldProblem) -> None:
 
     assert told == sorted(told)
     assert found.iterations == told[-1] >= 400
+
+
+@pytest.mark.parametrize("threads", [1, 2])
+def test_effort_ends_it_earlier_and_alike_everywhere(problem: FieldProblem, threads: int) -> None:
+    state = FieldState.at_start(problem)
+    whole = optimise_lists(problem.kernel, state, iterations=4000, threads=threads)
+    cut = optimise_lists(
+        problem.kernel, state, iterations=4000, effort=Effort(100_000), threads=threads
+    )
+    assert cut.iterations < whole.iterations / 4
+    assert cut == optimise_lists(
+        problem.kernel, state, iterations=4000, effort=Effort(100_000), threads=1
+    )
+
+
+def test_effort_that_is_not_used_up_changes_nothing(problem: FieldProblem) -> None:
+    state = FieldState.at_start(problem)
+    effort = Effort(10**12)
+    assert optimise_lists(problem.kernel, state, iterations=300, effort=effort) == optimise_lists(
+        problem.kernel, state, iterations=300
+    )
+
+
+def test_what_is_on_no_list_yet_is_placed_whatever_the_effort(problem: FieldProblem) -> None:
+    state = FieldState.at_start(problem)
+    found = optimise_lists(problem.kernel, state, iterations=250, effort=Effort(1, 10))
+    assert found.iterations == 20  # ten of each lane at a time
+    assert found.n_left_out == 0
 
 
 def test_tasks_go_to_uavs_that_take_part_alone(problem: FieldProblem) -> None:
