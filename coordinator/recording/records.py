@@ -149,6 +149,8 @@ class _EntrySaid:
     begin_s: float
     end_s: float
     reversed: bool
+    up_m: list[float] = field(default_factory=list)
+    """Heights of the corners and of the end, in missions over a ground."""
 
 
 @dataclass(frozen=True, slots=True)

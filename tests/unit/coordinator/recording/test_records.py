@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coordinator.planner.plan import make_plan
 from coordinator.recording.records import (
     SCHEMAS,
     RecordingStarted,
@@ -32,6 +33,8 @@ from swarm.protocol.events import (
     Tick,
 )
 from swarm.protocol.messages import Message, Snapshot, TaskEdit
+from swarm.runtime.clock import SystemClock
+from swarm.scenario import load_scenario, shipped_scenarios
 from tests.support.builders import MISSION, done, held, message
 from tests.support.message_strategies import (
     counts,
@@ -97,6 +100,18 @@ def test_every_fact_comes_back_as_it_was_and_fits_its_schema(
 
     assert line is not None
     assert decode(line.schema, line.data) == (now_s, fact)
+    validator(line.schema).validate(json.loads(line.data))
+
+
+@pytest.mark.parametrize("scenario", sorted(shipped_scenarios()))
+def test_plans_of_all_kinds_of_missions_come_back_too(scenario: str) -> None:
+    mission = load_scenario(shipped_scenarios()[scenario])
+    plan = make_plan(mission, "greedy", clock=SystemClock())
+
+    line = encode(plan, MISSION, 0.0, None)
+
+    assert line is not None
+    assert decode(line.schema, line.data) == (0.0, plan)
     validator(line.schema).validate(json.loads(line.data))
 
 
