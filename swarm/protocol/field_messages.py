@@ -9,10 +9,10 @@ from __future__ import annotations
 import zlib
 from dataclasses import asdict, dataclass
 from functools import lru_cache
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 from annotated_types import Ge, Gt, Le, Len
-from pydantic import Strict
+from pydantic import ConfigDict, Strict
 
 from swarm.model import Area, AreaId, Base, BaseId, Camera, Zone, ZoneId
 from swarm.model.terrain import MOST_HEIGHTS, Terrain
@@ -180,6 +180,13 @@ class TerrainSpec(Checked):
     Raises:
         ValueError: it is no ground that a mission could have.
     """
+
+    # Recordings are JSON; what is packed is no text.
+    __pydantic_config__: ClassVar[ConfigDict] = {
+        **Checked.__pydantic_config__,
+        "ser_json_bytes": "base64",
+        "val_json_bytes": "base64",
+    }
 
     clearance_m: Height
     """No path comes closer to the ground [m]."""

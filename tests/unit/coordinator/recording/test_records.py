@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from coordinator.core.publication import mission_config_of
 from coordinator.planner.plan import make_plan
 from coordinator.recording.records import (
     SCHEMAS,
@@ -20,7 +21,8 @@ from coordinator.recording.records import (
     encode,
     schema_of,
 )
-from swarm.model.ids import OPERATOR
+from swarm.model.ids import COORDINATOR, OPERATOR
+from swarm.model.layers import FlightLayers
 from swarm.protocol.events import (
     CommonEvent,
     KeysReplaced,
@@ -112,6 +114,19 @@ def test_plans_of_all_kinds_of_missions_come_back_too(scenario: str) -> None:
 
     assert line is not None
     assert decode(line.schema, line.data) == (0.0, plan)
+    validator(line.schema).validate(json.loads(line.data))
+
+
+@pytest.mark.parametrize("scenario", sorted(shipped_scenarios()))
+def test_briefs_of_all_kinds_of_missions_come_back_too(scenario: str) -> None:
+    mission = load_scenario(shipped_scenarios()[scenario])
+    brief = mission_config_of(mission, FlightLayers(), run=1)
+    fact = MessageReceived(message(str(COORDINATOR), brief))
+
+    line = encode(fact, MISSION, 0.0, None)
+
+    assert line is not None
+    assert decode(line.schema, line.data) == (0.0, fact)
     validator(line.schema).validate(json.loads(line.data))
 
 
