@@ -24,7 +24,7 @@ from swarm.runtime.options import JsonOption
 from swarm.scenario.files import resolve_scenario
 
 _SCENARIO = "hayfield"
-_DEFAULT_METHODS = "guided,strips,ortools,ortools-makespan"
+_DEFAULT_METHODS = "guided,strips,strips-relaunched,ortools,ortools-makespan"
 
 
 def areas(
@@ -52,8 +52,8 @@ def areas(
         typer.Option(
             "--methods",
             metavar="NAME,…",
-            help="Among guided, strips, ortools and ortools-makespan; the latter two also from "
-            "value-per-time's lists: ortools-warm, ortools-makespan-warm.",
+            help="Among guided, strips, strips-relaunched, ortools and ortools-makespan; the last "
+            "two also from value-per-time's lists: ortools-warm, ortools-makespan-warm.",
         ),
     ] = _DEFAULT_METHODS,
     json: JsonOption = False,
@@ -72,7 +72,8 @@ def areas(
 
     How soon 99.5 % of what may be covered is, and the mean coverage until all are through:
     undisturbed, and with one UAV lost at random. Then our agents fly in virtual time, and of the
-    split the lost one's strips are flown by whoever is first through with the own ones.
+    split the lost one's strips are flown by whoever is first through with the own ones: straight
+    on, or (strips-relaunched) from a base with a new battery, as ground stations need it.
 
     Examples:
         swarm bench areas

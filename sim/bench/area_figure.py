@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 _COLOURS = dict(
     zip(
         METHODS,
-        ("#0072B2", "#D55E00", "#009E73", "#56B4E9", "#CC79A7", "#E69F00"),
+        ("#0072B2", "#D55E00", "#8C510A", "#009E73", "#56B4E9", "#CC79A7", "#E69F00"),
         strict=True,
     )
 )
-_MARKERS = dict(zip(METHODS, ("o", "s", "^", "v", "D", "P"), strict=True))
+_MARKERS = dict(zip(METHODS, ("o", "s", "X", "^", "v", "D", "P"), strict=True))
 _POINTS = 600
 
 

@@ -19,7 +19,7 @@ from sim.bench.area_coverage import FlownLine, SurveyedGround
 from sim.bench.field_methods import index_lists
 from sim.bench.field_score import score_in_field
 from sim.study.baselines import ortools_field
-from sim.study.baselines.strips import strips, taken_over
+from sim.study.baselines.strips import Lists, relaunched, strips, taken_over
 from sim.world.engine import stream
 from sim.world.stochastic_world import StochasticWorld
 from sim.world.uncertainty import Uncertainty
@@ -125,8 +125,8 @@ class AreaMethod:
     """One way to share an area out."""
 
     what: str
-    fly: Callable[[AreaCase, int], AreaFlight]
-    """Undisturbed, with a seed."""
+    fly: Callable[[AreaCase, int], AreaFlight] | None
+    """Undisturbed, with a seed; None: as another method does."""
     seeded: bool = False
     """Whether a seed decides what it finds."""
     fly_under_loss: Callable[[AreaCase, int, Loss], AreaFlight] | None = None
@@ -182,11 +182,17 @@ def _fly_strips(case: AreaCase, seed: int) -> AreaFlight:
     return case.flown(case.strips)
 
 
-def _fly_strips_under_loss(case: AreaCase, seed: int, loss: Loss) -> AreaFlight:
+def _fly_strips_under_loss(
+    case: AreaCase, seed: int, loss: Loss, *, after: Callable[..., tuple[Lists, int]]
+) -> AreaFlight:
     del seed
     lost = case.problem.uav_ids.index(loss.uav)
-    lists, _ = taken_over(case.problem, case.strips, lost, loss.at_s)
+    lists, _ = after(case.problem, case.strips, lost, loss.at_s)
     return case.flown(lists)
+
+
+def _relaunch_refusal(case: AreaCase) -> str | None:
+    return None if case.problem.n_base else "there is no base to set out from anew"
 
 
 def _fly_ortools(case: AreaCase, seed: int, *, makespan: bool, warm: bool) -> AreaFlight:
@@ -223,7 +229,13 @@ METHODS: Mapping[str, AreaMethod] = {
     "strips": AreaMethod(
         "a fixed split, the lines as one vehicle would mow them in pieces of equal length",
         _fly_strips,
-        fly_under_loss=_fly_strips_under_loss,
+        fly_under_loss=partial(_fly_strips_under_loss, after=taken_over),
+    ),
+    "strips-relaunched": AreaMethod(
+        "the same, but who takes over lands first, gets a full battery and sets out anew",
+        None,
+        fly_under_loss=partial(_fly_strips_under_loss, after=relaunched),
+        refusal=_relaunch_refusal,
     ),
     "ortools": _ortools("for J", makespan=False, warm=False),
     "ortools-warm": _ortools("for J", makespan=False, warm=True),

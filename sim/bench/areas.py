@@ -173,8 +173,8 @@ _MEASURED = (
 )
 _LOSSES = (
     "One loss: a random UAV at a random moment within 0.2 to 0.6 of the makespan of strips. What "
-    "is left of its strips is flown by whoever is first through with the own ones; guided is flown "
-    "by the real agents and their coordinator in virtual time."
+    "is left of its strips is flown by whoever is first through with the own ones, straight on; "
+    "guided is flown by the real agents and their coordinator in virtual time."
 )
 _NO_SLOTS = " Nor does it know how many UAVs a base serves at a time: they wait when flown."
 
@@ -190,7 +190,7 @@ def measure_areas(
 ) -> AreasBench:
     """Fly the mission by each method, undisturbed and with one UAV lost by each seed.
 
-    Methods without seeds fly it undisturbed once. With a loss guided and strips are flown.
+    Methods without seeds fly it undisturbed once. With a loss guided and the splits are flown.
 
     Raises:
         InputError: the mission is none to compare by its coverage.
@@ -200,17 +200,18 @@ def measure_areas(
     able = [name for name in methods if refusals[name] is None]
     flights: list[_MethodFlight] = []
     for name in able:
+        if (fly := METHODS[name].fly) is None:
+            continue
         for seed in seeds if METHODS[name].seeded else (None,):
             tell(f"{UNDISTURBED}, {name}, seed {seed}")
-            flights.append(_MethodFlight(name, seed, METHODS[name].fly(case, seed or 0)))
+            flights.append(_MethodFlight(name, seed, fly(case, seed or 0)))
     runs = _runs(case, UNDISTURBED, flights)
     for seed in seeds:
         loss, flights = case.loss(seed), []
         for name in able:
-            fly = METHODS[name].fly_under_loss
-            if fly is not None:
+            if (fly_under_loss := METHODS[name].fly_under_loss) is not None:
                 tell(f"{ONE_LOSS}, {name}, seed {seed}")
-                flights.append(_MethodFlight(name, seed, fly(case, seed, loss)))
+                flights.append(_MethodFlight(name, seed, fly_under_loss(case, seed, loss)))
         runs += _runs(case, ONE_LOSS, flights, loss)
     return AreasBench(
         machine=machine,

@@ -3,12 +3,14 @@
 What ground stations do today with several vehicles: the lines of an area, in the order in which one
 vehicle would mow them, are cut into as many pieces of equal length as there are vehicles. Nobody
 takes anybody else's; when a vehicle is lost, whoever is the first to be through with the own strips
-is sent to fly what is left of the lost one's, in the same order.
+flies what is left of the lost one's, in the same order: straight on, which no ground station has a
+way to order, or from home with a new battery and a mission that begins where the lost one's ended.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import groupby
 
 import numpy as np
@@ -81,7 +83,7 @@ def strips(problem: FieldProblem, areas: Sequence[Sequence[Task]]) -> Lists:
 
 
 def taken_over(problem: FieldProblem, lists: Lists, lost: int, lost_s: float) -> tuple[Lists, int]:
-    """Lists as they are flown if a UAV is lost, and who flies the rest of its.
+    """Lists as they are flown if a UAV is lost, and who flies the rest of its, straight on.
 
     In their favour visits of whoever takes it over are chosen as if it had known of that from the
     beginning.
@@ -92,6 +94,34 @@ def taken_over(problem: FieldProblem, lists: Lists, lost: int, lost_s: float) ->
         lost: the UAV.
         lost_s: when it is lost [s mission time]; what it is at then does not count.
     """
+    flown, rest, heir = _inherited(problem, lists, lost, lost_s)
+    flown[heir] = list(_alone(problem, heir, [*flown[heir], *rest])[heir])
+    return flown, heir
+
+
+def relaunched(problem: FieldProblem, lists: Lists, lost: int, lost_s: float) -> tuple[Lists, int]:
+    """The same, but the heir lands first, as its mission ends: it gets a full battery and sets out.
+
+    At the base from which it is through soonest. Nothing is counted for whoever writes that new
+    mission.
+
+    Args:
+        problem: the mission; it has a base.
+        lists: of `strips`.
+        lost: the UAV.
+        lost_s: when it is lost [s mission time]; what it is at then does not count.
+    """
+    flown, rest, heir = _inherited(problem, lists, lost, lost_s)
+    if not rest:
+        return flown, heir
+    found = [_set_out_anew(problem, flown, heir, rest, base) for base in range(problem.n_base)]
+    return min(found, key=lambda after: _ends_s(problem, after)[heir][-1]), heir
+
+
+def _inherited(
+    problem: FieldProblem, lists: Lists, lost: int, lost_s: float
+) -> tuple[list[list[int]], list[int], int]:
+    """Lists without what a lost UAV has not done, that in its order, and who is through first."""
     ends_s = _ends_s(problem, lists)
     done = sum(end_s <= lost_s for end_s in ends_s[lost])
     rest = [item for item in lists[lost][done:] if item >= 0]
@@ -100,8 +130,29 @@ def taken_over(problem: FieldProblem, lists: Lists, lost: int, lost_s: float) ->
     flown[lost] = flown[lost][:done]
     while flown[lost] and flown[lost][-1] < 0:
         flown[lost].pop()
-    flown[heir] = list(_alone(problem, heir, [*flown[heir], *rest])[heir])
-    return flown, heir
+    return flown, rest, heir
+
+
+def _set_out_anew(
+    problem: FieldProblem, lists: Lists, heir: int, rest: Sequence[int], base: int
+) -> Lists:
+    """Lists in which one more sortie, or several, from a base do the ``rest``."""
+    landed = [[*own, -1 - base] if uav == heir else own for uav, own in enumerate(lists)]
+    state = FieldState.at_start(problem)
+    mine = np.arange(problem.n_uav) == heir
+    first_s = state.first_s.copy()
+    first_s[heir] = problem.leg_s[problem.kind[heir], problem.n_uav + base]
+    ready = replace(
+        state,
+        free_s=np.where(mine, _ends_s(problem, landed)[heir][-1], state.free_s),
+        first_s=first_s,
+        active=mine,
+        landed_at=np.where(mine, base, -1),
+    )
+    return [
+        [*own, *_alone(problem, heir, rest, ready)[heir]] if uav == heir else own
+        for uav, own in enumerate(landed)
+    ]
 
 
 def _ends_s(problem: FieldProblem, lists: Lists) -> list[list[float]]:
@@ -111,11 +162,16 @@ def _ends_s(problem: FieldProblem, lists: Lists) -> list[list[float]]:
     return [[next(ends_s) for _ in own] for own in lists]
 
 
-def _alone(problem: FieldProblem, uav: int, items: Sequence[int]) -> Lists:
-    """Lists in which a UAV does those tasks in that order, all else as is best for it."""
+def _alone(
+    problem: FieldProblem, uav: int, items: Sequence[int], state: FieldState | None = None
+) -> Lists:
+    """Lists in which a UAV does those tasks in that order, all else as is best for it.
+
+    From the start, unless a ``state`` says where it stands.
+    """
     orders: list[Sequence[int]] = [()] * problem.n_uav
     orders[uav] = [item for item in items if item >= 0]
-    state = FieldState.at_start(problem)
+    state = FieldState.at_start(problem) if state is None else state
     return optimise_lists(problem.kernel, state, iterations=0, lists=orders, threads=1).lists
 
 

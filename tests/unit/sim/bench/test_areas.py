@@ -96,7 +96,7 @@ def test_areas_count_by_their_size() -> None:
 
 @pytest.fixture(scope="module")
 def bench() -> AreasBench:
-    methods = ["guided", "strips", "ortools", "ortools-makespan-warm"]
+    methods = ["guided", "strips", "strips-relaunched", "ortools", "ortools-makespan-warm"]
     mission = paddock(endurance_s=100.0, slots=1)
     return measure_areas(mission, [0, 3], methods, TIMES, SystemClock())
 
@@ -109,7 +109,11 @@ def test_all_cover_everything_and_are_compared_with_the_best(bench: AreasBench) 
         (UNDISTURBED, "strips", None),
         (UNDISTURBED, "ortools", None),
         (UNDISTURBED, "ortools-makespan-warm", None),
-        *((ONE_LOSS, method, seed) for seed in (0, 3) for method in ("guided", "strips")),
+        *(
+            (ONE_LOSS, method, seed)
+            for seed in (0, 3)
+            for method in ("guided", "strips", "strips-relaunched")
+        ),
     ]
     for run in bench.runs:
         assert run.covered > 0.995, run
@@ -126,13 +130,19 @@ def test_all_cover_everything_and_are_compared_with_the_best(bench: AreasBench) 
 def test_a_loss_is_drawn_by_the_seed_and_met_by_both(bench: AreasBench) -> None:
     strips_s = next(run.makespan_s for run in bench.runs if run.method == "strips")
     lost = [(run.lost, run.lost_s) for run in bench.runs if run.case == ONE_LOSS]
-    assert lost[0] == lost[1] != lost[2] == lost[3]
+    assert lost[0] == lost[1] == lost[2] != lost[3] == lost[4] == lost[5]
     for _, lost_s in lost:
         assert lost_s is not None
         assert 0.2 * strips_s <= lost_s <= 0.6 * strips_s
     for run in bench.runs:
-        if run.case == ONE_LOSS and run.method == "strips":
+        if run.case == ONE_LOSS and run.method != "guided":
             assert run.makespan_s > strips_s
+
+
+def test_whoever_sets_out_anew_needs_a_base() -> None:
+    case = AreaCase(replace(paddock(), bases=()), TIMES, SystemClock())
+    assert METHODS["strips-relaunched"].refusal(case) == "there is no base to set out from anew"
+    assert METHODS["strips"].refusal(case) is None
 
 
 def test_agents_fly_what_the_plan_says_or_better_if_nobody_is_lost_before_its_end() -> None:

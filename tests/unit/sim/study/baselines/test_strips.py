@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sim.study.baselines.strips import Lists, mowing_order, strips, taken_over
+from sim.study.baselines.strips import Lists, mowing_order, relaunched, strips, taken_over
 from swarm.allocation.field import FieldProblem, FieldState
 from swarm.kernels.field import FlownLists, fly_lists
 from swarm.model import Mission, Task
@@ -129,3 +129,31 @@ def test_who_is_through_first_flies_what_the_lost_one_has_not(lost: int, slots: 
     ends_s = np.split(times_s[:, 3], [len(after[0])])
     assert ends_s[lost].max(initial=0.0) <= lost_s
     assert ends_s[heir].max() > before.max()
+
+
+@pytest.mark.parametrize("endurance_s", [None, 100.0])
+@pytest.mark.parametrize("lost", [0, 1])
+def test_who_lands_first_sets_out_anew_from_the_base_with_a_full_battery(
+    lost: int, endurance_s: float | None
+) -> None:
+    problem, lists = shared_out(paddock(endurance_s=endurance_s))
+    lost_s = 1.0
+    straight_on, _ = taken_over(problem, lists, lost, lost_s)
+
+    after, heir = relaunched(problem, lists, lost, lost_s)
+
+    assert heir == 1 - lost
+    own = len(lists[heir])
+    assert list(after[heir][:own]) == list(lists[heir])
+    assert after[heir][own] == -1
+    assert tasks_of(after[heir][own:]) == tasks_of(lists[lost])
+    landing, straight = flown(problem, after), flown(problem, straight_on)
+    assert landing.feasible
+    assert landing.times_s[:, 3].max() >= straight.times_s[:, 3].max() - 1e-6
+
+
+def test_nobody_sets_out_anew_where_nothing_is_left_to_take_over() -> None:
+    problem, lists = shared_out(paddock())
+    after, heir = relaunched(problem, lists, 0, 1e4)
+    assert after == [list(own) for own in lists]
+    assert heir == 1
