@@ -46,6 +46,8 @@ class Terrain:
     """What all heights are above [m above the mission origin]."""
     steps: bytes = field(repr=False)
     """Row by row, how many `STEP_M` each height is above the lowest: two bytes, the lower first."""
+    file: str | None = field(default=None, compare=False)
+    """Path of the file that they are from; None where nobody knows it, as in flight."""
 
     def __post_init__(self) -> None:
         numbers = ("clearance_m", "west_m", "south_m", "east_step_m", "north_step_m", "lowest_m")

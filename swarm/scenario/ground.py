@@ -100,6 +100,29 @@ def on_ground(mission: Mission, file: Path, clearance_m: float) -> Mission:
     )
 
 
+def off_ground(mission: Mission) -> Mission:
+    """``mission`` as it was before `on_ground`: no place has a height, and no ground is known."""
+
+    def flat(place_enu_m: _Point) -> _Point:
+        return (*place_enu_m[:2], 0.0)
+
+    tasks = tuple(
+        replace(
+            task,
+            position_enu_m=flat(task.position_enu_m),
+            path_enu_m=tuple(map(flat, task.path_enu_m)),
+        )
+        for task in mission.tasks
+    )
+    return replace(
+        mission,
+        uavs=tuple(_standing_at(uav, flat(uav.position_enu_m)) for uav in mission.uavs),
+        bases=tuple(_standing_at(base, flat(base.position_enu_m)) for base in mission.bases),
+        tasks=tasks,
+        terrain=None,
+    )
+
+
 def _standing_at(who: _Standing, place_enu_m: _Point) -> _Standing:
     return replace(who, position_enu_m=place_enu_m)
 

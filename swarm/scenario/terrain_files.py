@@ -16,7 +16,7 @@ import warnings
 import zipfile
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO
 
@@ -112,7 +112,8 @@ def read_terrain(path: Path, origin: Origin, around: Box, clearance_m: float) ->
     try:
         raster = _raster(path, origin, _grown(around, _FRAME_M))
         frame, count = _frame(raster, origin, around)
-        return _terrain(raster, origin, around, frame, count, clearance_m)
+        terrain = _terrain(raster, origin, around, frame, count, clearance_m)
+        return replace(terrain, file=str(path.resolve()))
     except _UnusableError as error:
         raise InputError(Fault(source, "", error.problem, error.remedy)) from error
     except (OSError, EOFError, zlib.error, zipfile.BadZipFile, NotImplementedError) as error:

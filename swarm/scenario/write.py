@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 
 from swarm.model import Area, Base, Camera, Mission, Task, Uav, Zone
+from swarm.scenario.ground import off_ground
 from swarm.scenario.plain import nobody_can
 from swarm.survey.cameras import name_of
 
@@ -22,9 +23,13 @@ def format_scenario(mission: Mission) -> str:
     """The text of a scenario file for ``mission``, with defaults left out.
 
     A mission whose numbers pass the limits of the format (see
-    swarm.scenario.shapes) is written all the same and refused when read. A mission over ground
-    knows the heights and not the file that they are from: it is written without ``[terrain]``.
+    swarm.scenario.shapes) is written all the same and refused when read. One over ground names the
+    file that the heights are from; where that is not known, as of a mission from the bus, it is
+    written without ``[terrain]``, its places as high as they are.
     """
+    schema, terrain = 1 if is_plain(mission) else 2, mission.terrain
+    if terrain is not None and terrain.file is not None:
+        mission = off_ground(mission)
     areas, rest = _areas_and_other_tasks(mission)
     head: dict[str, object] = {"name": mission.name}
     if not rest and not areas:
@@ -33,10 +38,12 @@ def format_scenario(mission: Mission) -> str:
     table = {key: getattr(mission, key) for key in rules} | _field_rules(mission)
     uavs, tasks = [_uav(uav) for uav in mission.uavs], [_task(task) for task in rest]
     zones = [_zone(zone) for zone in mission.zones]
-    schema = 1 if is_plain(mission) else 2
     blocks = [[f"schema = {schema}", *toml_lines(head)], ["[mission]", *toml_lines(table)]]
     if mission.origin is not None:
         blocks.append(["[origin]", *toml_lines(asdict(mission.origin))])
+    if terrain is not None and terrain.file is not None:
+        about = {"file": terrain.file, "clearance_m": terrain.clearance_m}
+        blocks.append(["[terrain]", *toml_lines(about)])
     blocks += [["[[uav]]", *toml_lines(uav)] for uav in uavs]
     blocks += [["[[base]]", *_base_lines(base)] for base in mission.bases]
     blocks += [["[[zone]]", *toml_lines(zone)] for zone in zones]
@@ -51,6 +58,7 @@ def is_plain(mission: Mission) -> bool:
         mission.bases
         or mission.zones
         or mission.areas
+        or mission.terrain
         or _field_rules(mission)
         or any(_given(uav, _OF_UAV) for uav in mission.uavs)
         or any(task.path_enu_m or _given(task, _OF_TASK) for task in mission.tasks)

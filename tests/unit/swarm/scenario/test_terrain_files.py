@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import gzip
 import zipfile
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-import rasterio
 from rasterio import Affine
 from rasterio.warp import transform
 
@@ -18,7 +18,8 @@ from swarm.model import Mission
 from swarm.model.frames import Origin, enu_from_wgs84, wgs84_from_enu
 from swarm.model.terrain import MOST_HEIGHTS
 from swarm.runtime.errors import InputError
-from swarm.scenario import load_scenario
+from swarm.scenario import format_scenario, load_scenario, parse_scenario
+from tests.support.ground_files import geotiff
 
 ORIGIN = Origin(47.4, 8.5, 488.0)
 SCENARIO = """\
@@ -69,23 +70,6 @@ def tile(void: bool = False) -> bytes:
     if void:
         heights_m[700:740, 590:620] = -32768
     return bytes(heights_m.tobytes())
-
-
-def geotiff(path: Path, heights_m: Any, **given: Any) -> None:
-    heights = np.asarray(heights_m, dtype=given.pop("dtype", "float32"))
-    heights = heights.reshape(-1, *heights.shape[-2:])
-    profile = {
-        "driver": "GTiff",
-        "count": len(heights),
-        "height": heights.shape[1],
-        "width": heights.shape[2],
-        "dtype": heights.dtype,
-        "crs": "EPSG:4326",
-        "transform": Affine(0.0005, 0.0, 8.49, 0.0, -0.0005, 47.41),
-        **given,
-    }
-    with rasterio.open(path, "w", **profile) as file:
-        file.write(heights)
 
 
 def wgs84_slope(side: int = 80) -> Any:
@@ -149,6 +133,42 @@ def test_no_pixel_of_a_projected_or_fine_geotiff_rises_above_the_ground(tmp_path
     flat_m = np.array([enu_from_wgs84(ORIGIN, *place, 0.0)[:2] for place in places])
     ground_m = ground_of(mission.terrain).up_m(flat_m)
     assert (ground_m - (heights_m[460:490, 320:350].ravel() - 488.0)).min() >= -0.3
+
+
+def test_a_mission_is_written_with_the_file_of_its_ground(tmp_path: Path) -> None:
+    geotiff(tmp_path / "hills.tif", wgs84_slope())
+    field = "polygon_m = [[100.0, 0.0], [300.0, 0.0], [300.0, 200.0], [100.0, 200.0]]"
+    mission = load(
+        tmp_path,
+        "hills.tif",
+        more=f'[[base]]\nid = "b"\nposition_m = [0.0, 50.0]\n[[area]]\nid = "hay"\n{field}\n'
+        'value = 9.0\nspacing_m = 25.0\nheight_m = 60.0\n[[task]]\nid = "line"\n'
+        "path_m = [[0.0, 200.0], [400.0, 300.0]]\nvalue = 2.0\n",
+    )
+    assert {base.position_enu_m[2] for base in mission.bases} != {0.0}
+
+    text = format_scenario(mission)
+
+    assert text.count("[[area]]") == 1
+    assert text.count("[[task]]") == 2
+    away = tmp_path / "elsewhere"
+    away.mkdir()
+    (away / "again.toml").write_text(text)
+    again = load_scenario(away / "again.toml")
+    assert again == mission
+    assert again.terrain is not None
+    assert again.terrain.file == str((tmp_path / "hills.tif").resolve())
+
+
+def test_a_mission_whose_file_is_not_known_is_written_as_high_as_it_is(tmp_path: Path) -> None:
+    geotiff(tmp_path / "hills.tif", wgs84_slope())
+    mission = load(tmp_path, "hills.tif")
+    assert mission.terrain is not None
+    heard = replace(mission, terrain=replace(mission.terrain, file=None))
+
+    again = parse_scenario(format_scenario(heard).encode(), "again.toml")
+
+    assert again == replace(mission, terrain=None)
 
 
 def test_what_is_wrong_with_a_tile_is_one_line(tmp_path: Path) -> None:
