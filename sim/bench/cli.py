@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -143,6 +142,7 @@ def plan(
         swarm bench plan
         swarm bench plan --sizes 20x100 --time-limit-s 1,3,10 --plot value.png
         swarm bench plan valley-survey --methods guided,cbba,exact --json
+        swarm bench plan hayfield --methods guided,greedy,value-per-time
         swarm bench plan --field --methods guided,ortools-warm --time-limit-s 10,60
         swarm bench plan --scaling --out scaling.md
     """
@@ -159,21 +159,19 @@ def plan(
 
     limits_s = each("--time-limit-s", time_limit_s, limit_of)
     all_seeds = seeds_of(seeds)
+    if field and (scenario is not None or scaling):
+        other = "SCENARIO" if scenario is not None else "--scaling"
+        problem = f"it draws random missions, and compares methods; {other} does not go with it"
+        raise InputError(Fault("--field", "", problem, "leave one of them out"))
+    field = field or _in_field(scenario, scaling=scaling)
     known = methods_for(MissionSource(field=field))
     default_methods = "guided,greedy" if scaling else ",".join(known)
     names = each("--methods", methods or default_methods, _one_of(known))
     check_files(plot, out)
     if scaling:
         limits_s, all_seeds = limits_s[:1], all_seeds[:1]
-    if field and (scenario is not None or scaling):
-        other = "SCENARIO" if scenario is not None else "--scaling"
-        problem = f"it draws random missions, and compares methods; {other} does not go with it"
-        raise InputError(Fault("--field", "", problem, "leave one of them out"))
     default_sizes = _FIELD_SIZES if field else _SCALING_SIZES if scaling else _DEFAULT_SIZES
-    sources = [
-        (name, replace(source, field=field))
-        for name, source in _sources(scenario, sizes, default_sizes)
-    ]
+    sources = _sources(scenario, sizes, default_sizes, field=field)
     if methods is not None and any(name.startswith("ortools") for name in names):
         from sim.study.baselines.ortools_routing import require_installed
 
@@ -231,22 +229,39 @@ bench.command("turnaround", short_help="Time from each arrival to the next targe
 bench.command("legs", short_help="Time of legs flown, beyond length / speed.")(legs)
 
 
+def _in_field(scenario: Path | None, *, scaling: bool) -> bool:
+    """Whether a scenario has the field's constraints, and so what it is compared by.
+
+    Raises:
+        InputError: it has, and sizes of plain missions are asked for beside it.
+    """
+    from coordinator.planner.field_plan import is_field
+    from swarm.scenario import load_scenario, require_plain
+
+    if scenario is None:
+        return False
+    mission = load_scenario(scenario)
+    if is_field(mission) and not scaling:
+        return True
+    require_plain(mission, "swarm bench")
+    return False
+
+
 def _sources(
-    scenario: Path | None, sizes: str | None, default: str
+    scenario: Path | None, sizes: str | None, default: str, *, field: bool
 ) -> list[tuple[str, MissionSource]]:
     """Cases by name, the scenario first."""
     from sim.bench.results import size_name
     from sim.bench.solvers import MissionSource
-    from swarm.scenario import load_scenario, require_plain
+    from swarm.scenario import load_scenario
 
     found: list[tuple[str, MissionSource]] = []
     if scenario is not None:
-        mission = load_scenario(scenario)
-        require_plain(mission, "swarm bench")
-        found.append((mission.name, MissionSource(scenario=str(scenario.resolve()))))
+        source = MissionSource(scenario=str(scenario.resolve()), field=field)
+        found.append((load_scenario(scenario).name, source))
     if scenario is None or sizes is not None:
         for n_uav, n_task in sizes_of(sizes or default):
-            source = MissionSource(n_uav=n_uav, n_task=n_task)
+            source = MissionSource(n_uav=n_uav, n_task=n_task, field=field)
             found.append((size_name(n_uav, n_task), source))
     return found
 

@@ -45,13 +45,17 @@ _MEASURED = (
 )
 
 _FIELD = (
+    "In the field plans compare by (fewest tasks left out, then J), all flown by the evaluator of "
+    "plans; broken: tasks of lists that cannot be flown, from the first on that cannot be done. "
+    "Then base visits are chosen anew, the best for the list's order, and only tasks for which "
+    "there are none are dropped."
+)
+
+_RANDOM_FIELD = (
     "Random missions in the field: UAVs, places, values and services as in plain ones of the same "
     "size, p = 1 and survival 1; batteries, less their reserve, last for 40 % of the mean list, "
     "two bases without a limit of slots, swaps of 15 s, four zones, half of the tasks begin in a "
-    "window; D = 1.2 × what the mission takes by value per time. Plans compare by (fewest tasks "
-    "left out, then J), all flown by the evaluator of plans; broken: tasks of lists that cannot be "
-    "flown, from the first on that cannot be done. Then base visits are chosen anew, the best for "
-    "the list's order, and only tasks for which there are none are dropped."
+    "window; D = 1.2 × what the mission takes by value per time."
 )
 
 _SCALING_TITLE = "Time and memory by size"
@@ -198,8 +202,8 @@ def _notes(bench: PlanBench, grids: Sequence[ResultTable]) -> list[str]:
         notes.append(ortools_field.LEFT_OUT if bench.field else SHORTFALL)
     if bench.field:
         notes.append(_FIELD)
-    elif any(_SIZE.fullmatch(row.case) for row in bench.measured):
-        notes.append(_RANDOM)
+    if any(_SIZE.fullmatch(row.case) for row in bench.measured):
+        notes.append(_RANDOM_FIELD if bench.field else _RANDOM)
     return notes
 
 

@@ -239,7 +239,7 @@ class MissionSource:
     horizon_s: float | None = None
     """D, where it is known already [s]."""
     field: bool = False
-    """Whether a random mission has the field's constraints, as `sim.bench.field_methods` has it."""
+    """Whether it has the field's constraints; a random one as `sim.bench.field_methods` has it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -283,11 +283,15 @@ def methods_for(source: MissionSource) -> Mapping[str, PlanningMethod[Any]]:
 
 def any_problem_of(source: MissionSource) -> Problem | FieldProblem:
     """The mission's arrays; pop-ups are unknown to a plan."""
-    if source.field:
-        from sim.bench.field_methods import bench_problem
+    if not source.field:
+        return problem_of(source)
+    if source.scenario is not None:
+        from swarm.allocation.field import FieldProblem
 
-        return bench_problem(source.n_uav, source.n_task, source.seed)
-    return problem_of(source)
+        return FieldProblem.from_mission(load_scenario(Path(source.scenario)).known_at_start())
+    from sim.bench.field_methods import bench_problem
+
+    return bench_problem(source.n_uav, source.n_task, source.seed)
 
 
 def problem_of(source: MissionSource) -> Problem:

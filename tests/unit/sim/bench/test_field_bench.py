@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import io
+import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,9 +16,12 @@ from sim.bench.plan_report import PlanReport, comparison_grids
 from sim.bench.plans import PlanBench, measure_plans
 from sim.bench.solvers import MissionSource, PlanningJob, PlanningRun, run_in_subprocess, run_job
 from swarm.allocation.field import FieldState
+from swarm.cli import main
 from swarm.kernels.field import fly_lists
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import InputError
+from swarm.scenario import format_scenario
+from tests.support.area_missions import paddock
 
 SMALL = ("4×16", MissionSource(n_uav=4, n_task=16, field=True))
 
@@ -84,6 +89,27 @@ def test_what_it_says_fits_a_terminal(bench: PlanBench) -> None:
     assert max(map(len, text.splitlines())) <= 80
     for part in ("left out", "broken", "guided-1-thread", "Random missions in the field"):
         assert part in text
+
+
+def test_a_scenario_of_the_field_is_planned_by_methods_that_heed_it(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    scenario = tmp_path / "paddock.toml"
+    scenario.write_text(format_scenario(paddock(endurance_s=100.0, slots=1)), "utf-8")
+    methods = ["guided-1-thread", "value-per-time", "ortools"]
+    options = ["--methods", ",".join(methods), "--time-limit-s", "0.2", "--seeds", "0"]
+
+    assert main(["bench", "plan", str(scenario), *options, "--json"]) == 0
+
+    rows = json.loads(capsys.readouterr().out)["measured"]
+    assert [(row["case"], row["method"]) for row in rows] == [("paddock", name) for name in methods]
+    assert [row["left_out"] for row in rows[:2]] == [0, 0]
+    assert rows[0]["ratio"] == 1.0
+    assert "slots" in rows[2]["note"]
+    assert main(["bench", "plan", str(scenario), *options]) == 0
+    said = capsys.readouterr().out
+    assert "In the field plans compare by" in said
+    assert "Random missions" not in said
 
 
 def test_a_job_in_the_field_is_done_in_a_process_of_its_own() -> None:
