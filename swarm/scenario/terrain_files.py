@@ -13,7 +13,6 @@ import gzip
 import math
 import re
 import warnings
-import zipfile
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -28,6 +27,7 @@ from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
 from swarm.model.terrain import MOST_HEIGHTS, MOST_STEPS, STEP_M, Terrain
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.findings import printable
+from swarm.scenario.task_files.archive import members_of
 
 FloatArray = npt.NDArray[np.float64]
 Box = tuple[float, float, float, float]
@@ -39,9 +39,9 @@ _MOST_BLOCK = 2**28
 """Bytes of a block, which is read as a whole."""
 _HIGHEST_M = 12_000.0
 """Nothing on Earth is farther from the sea level."""
-_PLAIN = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
-"""How tiles in archives may be packed."""
 _HGT_SIDES = (1201, 3601)
+_MOST_BYTES = 2 * _HGT_SIDES[-1] ** 2
+"""Of a tile, packed or not."""
 _HGT_VOID = -32768
 _TILE = re.compile(r"([NS])(\d\d)([EW])(\d\d\d)", re.IGNORECASE)
 _SUFFIXES = (".tif", ".tiff", ".hgt", ".hgt.gz", ".hgt.zip")
@@ -116,7 +116,7 @@ def read_terrain(path: Path, origin: Origin, around: Box, clearance_m: float) ->
         return replace(terrain, file=str(path.resolve()))
     except _UnusableError as error:
         raise InputError(Fault(source, "", error.problem, error.remedy)) from error
-    except (OSError, EOFError, zlib.error, zipfile.BadZipFile, NotImplementedError) as error:
+    except (OSError, EOFError, zlib.error) as error:
         reason = (error.strerror if isinstance(error, OSError) else None) or str(error)
         fault = Fault(source, "", f"cannot be read: {printable(reason)}", "give a readable file")
         raise InputError(fault) from error
@@ -168,20 +168,16 @@ def _hgt_bytes(path: Path) -> bytes:
     if name.endswith(".gz"):
         with gzip.open(path, "rb") as unzipped:
             return _some(unzipped)
-    with zipfile.ZipFile(path) as archive:
-        names = [each for each in archive.namelist() if each.lower().endswith(".hgt")]
-        if len(names) != 1:
-            raise _UnusableError(f"has {len(names)} tiles in it", "give one with one .hgt in it")
-        if archive.getinfo(names[0]).flag_bits & 1:
-            raise _UnusableError("is locked by a password", "give it unlocked")
-        if (method := archive.getinfo(names[0]).compress_type) not in _PLAIN:
-            raise _UnusableError(f"is packed by method {method}", "pack it by deflate")
-        with archive.open(names[0]) as member:
-            return _some(member)
+    with path.open("rb") as file:
+        packed = _some(file)
+    tiles = members_of(packed, [".hgt"], printable(str(path)), _MOST_BYTES)
+    if len(tiles) != 1:
+        raise _UnusableError(f"has {len(tiles)} tiles in it", "give one with one .hgt in it")
+    return next(iter(tiles.values()))
 
 
 def _some(file: IO[bytes] | gzip.GzipFile) -> bytes:
-    return file.read(2 * _HGT_SIDES[-1] ** 2 + 1)
+    return file.read(_MOST_BYTES + 1)
 
 
 # -- GeoTIFF ------------------------------------------------------------------------------

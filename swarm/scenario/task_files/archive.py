@@ -35,8 +35,12 @@ def member_of(data: bytes, suffix: str, source: str) -> bytes:
     return next(iter(members.values()))
 
 
-def members_of(data: bytes, suffixes: Collection[str], source: str) -> Mapping[str, bytes]:
+def members_of(
+    data: bytes, suffixes: Collection[str], source: str, most_bytes: int = LARGEST_FILE_BYTES
+) -> Mapping[str, bytes]:
     """All files in an archive whose names end in one of ``suffixes``, by name, as it has them.
+
+    Together they have ``most_bytes`` at most.
 
     Raises:
         InputError: it is no archive, or too much to unpack.
@@ -46,7 +50,7 @@ def members_of(data: bytes, suffixes: Collection[str], source: str) -> Mapping[s
         problem = f"holds {count} files, more than {_MOST_MEMBERS}"
         raise InputError(Fault(source, "", problem, _GIVE))
     found: dict[str, bytes] = {}
-    left = LARGEST_FILE_BYTES
+    left = most_bytes
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             for info in archive.infolist():
@@ -57,7 +61,7 @@ def members_of(data: bytes, suffixes: Collection[str], source: str) -> Mapping[s
                     content = file.read(left + 1)
                 left -= len(content)
                 if left < 0:
-                    problem = f"unpacks to more than {LARGEST_FILE_BYTES // 2**20} MiB"
+                    problem = f"unpacks to more than {most_bytes // 2**20} MiB"
                     where = printable(info.filename)
                     raise InputError(Fault(source, where, problem, "give a smaller one"))
                 found[info.filename] = content
