@@ -1,7 +1,8 @@
 """What a UAV flies from one take-off to the next landing, and the mission items that tell it so.
 
 Lines are flown from end to end, with the camera triggered by distance from where they begin to
-where they end; ways round zones are waypoints. Waits for a task to open are hold times. An item of
+where they end, and pointed at what closed lines of the kind `structure` lead round; ways round
+zones are waypoints. Waits for a task to open are hold times. An item of
 MAVLink holds whole seconds on ArduPilot. Leaves out: files, and what else a plan has.
 """
 
@@ -16,12 +17,16 @@ from swarm.model import Mission, Origin, Plan, Task, Uav
 from swarm.model.frames import wgs84_from_enu
 from swarm.scenario.task_files.exported_tasks import ExportedTask
 from swarm.scenario.task_files.mission_items import MavCommand, MavFrame
+from swarm.scenario.task_files.survey_patterns import STRUCTURE_KIND
 
 _RELATIVE = 1
 _GROUND_SPEED = 1
 _THROTTLE_AS_IT_IS = -1
 _PICTURE_AT_ONCE = 1
 _LEAST_WAIT_S = 1e-6
+_LEAST_RING = 4
+"""Points of a closed line round anything, its beginning told twice."""
+_CLOSED_M = 0.1
 _Point = tuple[float, float, float]
 
 
@@ -150,6 +155,9 @@ class SortieItems:
             self._remember(leg, first, first)
             return
         self._at(MavCommand.WAYPOINT, leg.wait_s, points[0])
+        if (structure_enu_m := _structure_enu_m(task, points)) is not None:
+            # Who has no gimbal that turns points its nose there, with either firmware.
+            self._at(MavCommand.SET_ROI_LOCATION, 0.0, structure_enu_m, heading=0.0)
         if task.trigger_m is not None:
             self._do(MavCommand.SET_CAM_TRIGG_DIST, task.trigger_m, 0, _PICTURE_AT_ONCE)
         for point in points[1:-1]:
@@ -158,14 +166,25 @@ class SortieItems:
         self._remember(leg, first, len(self._items))
         if task.trigger_m is not None:
             self._do(MavCommand.SET_CAM_TRIGG_DIST, 0, 0, _PICTURE_AT_ONCE)
+        if structure_enu_m is not None:
+            self._do(MavCommand.SET_ROI_NONE)
 
     def _remember(self, leg: Leg, first: int, last: int) -> None:
         in_layer = leg.task.height_m is None
         said = dict(_said_of(leg.task))
         self._tasks.append(ExportedTask(said, first, last, in_layer, leg.is_reversed))
 
-    def _at(self, command: MavCommand, first: float, point_enu_m: _Point) -> None:
-        """An item at a place; no heading, so the vehicle keeps to its own setting."""
+    def _at(
+        self,
+        command: MavCommand,
+        first: float,
+        point_enu_m: _Point,
+        heading: float | None = None,
+    ) -> None:
+        """An item at a place; no heading, so the vehicle keeps to its own setting.
+
+        ArduPilot takes none but of what is flown to: there it is 0, which means nothing.
+        """
         up_m = point_enu_m[2] - self.sortie.start_enu_m[2]
         self._items.append(
             {
@@ -174,7 +193,7 @@ class SortieItems:
                 "AltitudeMode": _RELATIVE,
                 "command": int(command),
                 "frame": int(MavFrame.GLOBAL_RELATIVE),
-                "params": [first, 0, 0, None, *self.lat_lon_deg(point_enu_m), up_m],
+                "params": [first, 0, 0, heading, *self.lat_lon_deg(point_enu_m), up_m],
             }
         )
 
@@ -189,6 +208,17 @@ class SortieItems:
 def _raised(point_enu_m: _Point, layer_m: float) -> _Point:
     east_m, north_m, up_m = point_enu_m
     return east_m, north_m, up_m + layer_m
+
+
+def _structure_enu_m(task: Task, points: Sequence[_Point]) -> _Point | None:
+    """The middle of what a closed line leads round, as high as it is flown [m]; None: nothing."""
+    closed = len(points) >= _LEAST_RING and math.dist(points[0], points[-1]) <= _CLOSED_M
+    if task.kind != STRUCTURE_KIND or not closed:
+        return None
+    import shapely
+
+    middle = shapely.Polygon([point[:2] for point in points]).centroid
+    return middle.x, middle.y, points[0][2]
 
 
 def _said_of(task: Task) -> Iterator[tuple[str, object]]:

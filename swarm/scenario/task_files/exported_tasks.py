@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from swarm.scenario.findings import number_of
-from swarm.scenario.task_files.mission_items import Heights, WaypointItem, whole_of
+from swarm.scenario.task_files.mission_items import Heights, MavCommand, WaypointItem, whole_of
 from swarm.scenario.task_files.task_file import LINE_KEYS, FileEntry, member
 
 _KEYS = frozenset({*LINE_KEYS} - {"height_m"})
@@ -71,11 +71,13 @@ def _entry(
         return None
     spots: list[tuple[float, float, float]] = []
     for item in items[first - 1 : last]:
+        if item.command != MavCommand.WAYPOINT:
+            continue  # what is switched, or looked at, on the way
         match [number_of(param) for param in item.params[4:]]:
             case [float(lat_deg), float(lon_deg), float(up_m)] if lat_deg or lon_deg:
                 spots.append((lat_deg, lon_deg, up_m))
             case _:
-                continue  # what is switched on the way
+                return None
     if not spots:
         return None
     if member(value, "reversed") is True:

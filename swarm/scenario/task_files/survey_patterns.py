@@ -26,6 +26,8 @@ from swarm.scenario.task_files.mission_items import Heights, above_ground, whole
 from swarm.scenario.task_files.task_file import Array, FileEntry, member, too_many_points
 
 TRANSECTS = "TransectStyleComplexItem"
+STRUCTURE_KIND = "structure"
+"""Kind of the closed lines round a structure, whose pictures are taken inwards."""
 _PREFIXES = {"survey": "survey", "CorridorScan": "corridor", "StructureScan": "structure"}
 _MOST_LINES = 100
 """A corridor or structure of more lines than that is refused."""
@@ -157,11 +159,17 @@ class PatternReader:
             return [Fault(self.source, place, problem, "draw it again in QGroundControl")]
         trigger = _trigger(camera, "AdjustedFootprintSide")
         self.notes.append(
-            f"{place}: lines round the structure are flown nose ahead; turn the camera to its side"
+            f"{place}: lines round the structure are flown nose ahead; turn the camera to its "
+            "side, or fly the plans of --export, which look at it"
         )
         return [
             FileEntry(
-                {"path": ring, "height_m": bottom_m + (number + 0.5) * layer_m, **trigger},
+                {
+                    "path": ring,
+                    "kind": STRUCTURE_KIND,
+                    "height_m": bottom_m + (number + 0.5) * layer_m,
+                    **trigger,
+                },
                 place,
                 prefix=_PREFIXES["StructureScan"],
             )

@@ -104,6 +104,29 @@ def test_a_line_is_flown_from_end_to_end_with_the_camera_on_along_it(tmp_path: P
     assert [items[number]["params"][0] for number in (2, 4, 5)] == [0.0, 0.0, 4.0]
 
 
+def test_the_camera_looks_at_what_a_closed_line_leads_round(tmp_path: Path) -> None:
+    ring = ((80.0, 0.0), (120.0, 0.0), (120.0, 40.0), (80.0, 40.0), (80.0, 0.0))
+    tower = replace(
+        LINE,
+        path_enu_m=tuple((*corner, 0.0) for corner in ring),
+        position_enu_m=(80.0, 0.0, 0.0),
+        kind="structure",
+    )
+    (document,) = exported(mission(tower), tmp_path)
+
+    assert commands(document) == [22, 178, 16, 195, 206, 16, 16, 16, 16, 206, 197, 20]
+    look = document["mission"]["items"][3]
+    assert place(look) == pytest.approx((100.0, 20.0, 60.0), abs=1e-3)
+    assert look["params"][:4] == [0.0, 0, 0, 0.0]  # ArduPilot refuses NaN there
+    back = read_task_file(tmp_path / "m.u.plan")
+    (entry,) = back.entries
+    assert entry.table["kind"] == "structure"
+    assert len(entry.table["path"]) == 5
+    open_line = replace(tower, path_enu_m=tower.path_enu_m[:4])
+    assert 195 not in commands(exported(mission(open_line), tmp_path)[0])
+    assert 195 not in commands(exported(mission(replace(tower, kind=None)), tmp_path)[0])
+
+
 def test_a_line_without_a_camera_and_height_is_flown_in_the_layer(tmp_path: Path) -> None:
     plain = replace(LINE, trigger_m=None, height_m=None)
     (document,) = exported(mission(plain), tmp_path)

@@ -189,8 +189,9 @@ def test_a_structure_is_one_closed_line_for_each_layer() -> None:
     (note,) = found.notes
     assert note == (
         "mission.items[0]: lines round the structure are flown nose ahead; "
-        "turn the camera to its side"
+        "turn the camera to its side, or fly the plans of --export, which look at it"
     )
+    assert {entry.table["kind"] for entry in found.entries} == {"structure"}
 
 
 def test_structures_of_before_version_3_count_from_their_altitude() -> None:
