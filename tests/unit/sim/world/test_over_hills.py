@@ -46,10 +46,10 @@ def _ridge() -> Mission:
 
 @pytest.fixture(scope="module", name="with_base")
 def _with_base() -> Mission:
-    """The ridge with a base half up its slope, and batteries for two thirds of the work."""
+    """The ridge with a base half up its slope, and batteries that are not full at first."""
     path = resolve_scenario("ridge")
     text = path.read_text("utf-8").replace(
-        "acceleration_m_s2 = 2.5", "acceleration_m_s2 = 2.5\nendurance_s = 215.0"
+        "acceleration_m_s2 = 2.5", "acceleration_m_s2 = 2.5\nendurance_s = 260.0\ncharge_frac = 0.6"
     )
     return parse_scenario((text + BARN).encode(), "barn.toml", path.parent)
 
