@@ -121,7 +121,7 @@ def test_the_camera_looks_at_what_a_closed_line_leads_round(tmp_path: Path) -> N
     back = read_task_file(tmp_path / "m.u.plan")
     (entry,) = back.entries
     assert entry.table["kind"] == "structure"
-    assert len(entry.table["path"]) == 5
+    assert entry.table["path"][0] == pytest.approx(entry.table["path"][-1])  # type: ignore[index]
     open_line = replace(tower, path_enu_m=tower.path_enu_m[:4])
     assert 195 not in commands(exported(mission(open_line), tmp_path)[0])
     assert 195 not in commands(exported(mission(replace(tower, kind=None)), tmp_path)[0])

@@ -148,6 +148,7 @@ def test_whoever_sets_out_anew_needs_a_base() -> None:
 def test_agents_fly_what_the_plan_says_or_better_if_nobody_is_lost_before_its_end() -> None:
     case = AreaCase(paddock(endurance_s=100.0), TIMES, SystemClock())
     guided = METHODS["guided"]
+    assert guided.fly is not None
     assert guided.fly_under_loss is not None
     planned = guided.fly(case, 1)
     late_s = max(line.end_s for line in planned.lines) + 100.0
