@@ -67,7 +67,7 @@ def test_story_goes_to_standard_error(tmp_path: Path, capsys: pytest.CaptureFixt
     assert captured.out == ""
     assert captured.err == (
         f"{source}: 3 tasks and 1 area of 4 lines for 3 UAVs; left out: takeoff, change speed, "
-        "command 195, return to launch\n"
+        "set roi location, return to launch\n"
         "note: areas without a value are worth 1 for every hectare (--value)\n"
         f"fly it with: swarm run {path}\n"
     )

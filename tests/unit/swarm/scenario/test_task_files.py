@@ -46,7 +46,7 @@ def test_plan_gives_waypoints_home_speed_and_what_is_left_out() -> None:
     assert found.left_out == {
         "takeoff": 1,
         "change speed": 1,
-        "command 195": 1,
+        "set roi location": 1,
         "return to launch": 1,
     }
 
