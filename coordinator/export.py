@@ -1,7 +1,8 @@
 """A plan as QGroundControl plans (``.plan``), one for every sortie of every UAV that has tasks.
 
 Take-off into the UAV's height layer, cruise speed, its tasks, and the way back: return to launch,
-or a landing at the base where a battery is changed, from which its next plan takes off. Zones are
+over hills a landing there, or one at the base where a battery is changed, from which its next plan
+takes off. Zones are
 the geofence as far as they lie in the way at every height that it flies at. Heights are above the
 place of take-off, which is the home of the plan. There are no rally points.
 
@@ -42,6 +43,7 @@ _HEEDED = frozenset(
         "base",
         "zone",
         "band_m",
+        "terrain",
     }
 )
 """What a mission may ask for, by the keys of a scenario."""
@@ -108,7 +110,7 @@ def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: ExportFirm
     for index, uav in enumerate(mission.uavs):
         sorties = sorties_of(mission, plan, uav)
         for number, sortie in enumerate(sorties, start=1):
-            items = SortieItems(sortie, uav, layers.layer_m(index), origin)
+            items = SortieItems(sortie, uav, layers.layer_m(index), origin, mission.terrain)
             zones = [zone for zone in mission.zones if not _blocks(zone, items)]
             unfenced |= dict.fromkeys(zone.id for zone in zones)
             document = sortie_plan(items, mission.zones, firmware)
@@ -135,6 +137,9 @@ def sortie_plan(
     uav, origin = items.uav, items.origin
     listed, tasks = items.listed()
     home_alt_m = origin.alt_m + items.sortie.start_enu_m[2]
+    remembered: dict[str, object] = {"layer_m": items.layer_m}
+    if items.terrain is None:  # else heights of items are not those that tasks ask for
+        remembered["tasks"] = [task.as_json() for task in tasks]
     return {
         "fileType": "Plan",
         "geoFence": {
@@ -156,7 +161,7 @@ def sortie_plan(
             "vehicleType": _QUADROTOR,
             "version": 2,
         },
-        LAYER_KEY: {"layer_m": items.layer_m, "tasks": [task.as_json() for task in tasks]},
+        LAYER_KEY: remembered,
         "rallyPoints": {"points": [], "version": 2},
         "version": 1,
     }

@@ -13,8 +13,13 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
+import numpy as np
+
+from swarm.allocation.field.network import points_over
+from swarm.allocation.legs.ground import ground_of
 from swarm.model import Mission, Origin, Plan, Task, Uav
 from swarm.model.frames import wgs84_from_enu
+from swarm.model.terrain import Terrain
 from swarm.scenario.task_files.exported_tasks import ExportedTask
 from swarm.scenario.task_files.mission_items import MavCommand, MavFrame
 from swarm.scenario.task_files.survey_patterns import STRUCTURE_KIND
@@ -41,6 +46,8 @@ class Leg:
     """On the spot, before the work begins [s]."""
     is_reversed: bool = False
     """A line is flown from its last point to its first."""
+    up_m: Sequence[float] = ()
+    """Heights at ``via_enu_m`` [m above the origin]; none where they are not known: evenly."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +59,8 @@ class Sortie:
     end_enu_m: _Point
     via_enu_m: Sequence[tuple[float, float]] = ()
     """Corners on the way to its end [m; east, north]."""
+    up_m: Sequence[float] = ()
+    """Heights at these, as of a leg [m]."""
 
 
 def sorties_of(mission: Mission, plan: Plan, uav: Uav) -> Sequence[Sortie]:
@@ -72,10 +81,10 @@ def sorties_of(mission: Mission, plan: Plan, uav: Uav) -> Sequence[Sortie]:
         if (task := by_name.get(entry.go)) is not None:
             wait_s = max(0.0, entry.begin_s - entry.arrive_s)
             wait_s = wait_s if wait_s > _LEAST_WAIT_S else 0.0
-            legs.append(Leg(task, via, wait_s, entry.is_reversed))
+            legs.append(Leg(task, via, wait_s, entry.is_reversed, entry.up_m[1:-1]))
             continue
         end = home if entry.base is None else bases[entry.base]
-        sorties.append(Sortie(start, legs, end, via))
+        sorties.append(Sortie(start, legs, end, via, entry.up_m[1:-1]))
         start, legs = end, []
     return sorties
 
@@ -89,6 +98,8 @@ class SortieItems:
     layer_m: float
     """Height of the UAV's layer above the places that it visits [m]."""
     origin: Origin
+    terrain: Terrain | None = None
+    """What heights of tasks count from, and lines follow; None: the origin."""
     _items: list[dict[str, object]] = field(default_factory=list)
     _tasks: list[ExportedTask] = field(default_factory=list)
 
@@ -102,7 +113,8 @@ class SortieItems:
         """Lowest and greatest height that it is at, above the origin [m]."""
         ends = (self.sortie.start_enu_m, self.sortie.end_enu_m)
         flown = [point for leg in self.sortie.legs for point in self._flown(leg)]
-        heights_m = [point[2] for point in (*ends, *flown)]
+        ways = (*self.sortie.up_m, *(up_m for leg in self.sortie.legs for up_m in leg.up_m))
+        heights_m = [*(point[2] for point in (*ends, *flown)), *ways]
         return min(heights_m), max(*heights_m, *(end[2] + self.layer_m for end in ends))
 
     def lat_lon_deg(self, point_enu_m: Sequence[float]) -> tuple[float, float]:
@@ -118,35 +130,47 @@ class SortieItems:
         self._do(MavCommand.CHANGE_SPEED, _GROUND_SPEED, self.uav.speed_m_s, _THROTTLE_AS_IT_IS)
         for leg in self.sortie.legs:
             points = self._flown(leg)
-            self._way(here, leg.via_enu_m, points[0])
+            self._way(here, leg.via_enu_m, points[0], leg.up_m)
             self._work(leg, points)
             here = points[-1]
         end = _raised(self.sortie.end_enu_m, self.layer_m)
-        self._way(here, self.sortie.via_enu_m, end)
-        if self.sortie.end_enu_m == self.sortie.start_enu_m:
+        self._way(here, self.sortie.via_enu_m, end, self.sortie.up_m)
+        if self.terrain is not None:
+            # A return to launch is straight, and LAND flies there as high as it is: not over hills.
+            self._at(MavCommand.WAYPOINT, 0.0, end)
+        elif self.sortie.end_enu_m == self.sortie.start_enu_m:
             self._do(MavCommand.RETURN_TO_LAUNCH)
-        else:
-            self._at(MavCommand.LAND, 0.0, self.sortie.end_enu_m)
+            return
+        self._at(MavCommand.LAND, 0.0, self.sortie.end_enu_m)
 
     def _flown(self, leg: Leg) -> Sequence[_Point]:
         """Where a task is flown, in the order of flight [m; ENU]."""
         task = leg.task
-        points = task.path_enu_m or (task.position_enu_m,)
+        points: Sequence[_Point] = task.path_enu_m or (task.position_enu_m,)
+        if self.terrain is not None:
+            points = points_over(ground_of(self.terrain), points, task.height_m)
         if leg.is_reversed:
             points = points[::-1]
+        if self.terrain is not None and task.height_m is not None:
+            return points
         if task.height_m is None:
             return [_raised(point, self.layer_m) for point in points]
         return [(*point[:2], task.height_m) for point in points]
 
-    def _way(self, here: _Point, via: Sequence[tuple[float, float]], there: _Point) -> None:
-        """Waypoints at the corners of a way, which climbs or sinks evenly along it."""
+    def _way(
+        self,
+        here: _Point,
+        via: Sequence[tuple[float, float]],
+        there: _Point,
+        up_m: Sequence[float],
+    ) -> None:
+        """Waypoints at the corners of a way, which climbs or sinks evenly along it unless told."""
         corners = [here[:2], *via, there[:2]]
-        whole_m = sum(math.dist(*piece) for piece in pairwise(corners))
-        gone_m = 0.0
-        for before, corner in zip(corners, via, strict=False):
-            gone_m += math.dist(before, corner)
-            share = gone_m / whole_m if whole_m > 0.0 else 1.0
-            self._at(MavCommand.WAYPOINT, 0.0, (*corner, here[2] + share * (there[2] - here[2])))
+        along_m = np.cumsum([math.dist(*piece) for piece in pairwise(corners)])
+        share = along_m / along_m[-1] if along_m[-1] > 0.0 else np.ones(len(along_m))
+        evenly_m = here[2] + share * (there[2] - here[2])
+        for corner, height_m in zip(via, up_m or evenly_m.tolist(), strict=False):
+            self._at(MavCommand.WAYPOINT, 0.0, (*corner, height_m))
 
     def _work(self, leg: Leg, points: Sequence[_Point]) -> None:
         task, first = leg.task, len(self._items) + 1

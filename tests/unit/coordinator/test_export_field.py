@@ -33,7 +33,9 @@ from swarm.model.frames import enu_from_wgs84
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario
-from swarm.scenario.task_files import TaskFile, read_task_file
+from swarm.scenario.files import resolve_scenario
+from swarm.scenario.task_files import ImportOptions, TaskFile, read_task_file, read_task_files
+from tests.support.hills import above_m
 
 PLAN = {"plan": EntryPoint("plan", "coordinator.cli:plan", "peckorder.commands")}
 IMPORT = {"import": EntryPoint("import", "swarm.scenario.cli:import_tasks", "peckorder.commands")}
@@ -209,20 +211,43 @@ def test_each_sortie_is_a_plan_that_takes_off_where_the_last_one_landed(tmp_path
     assert sorted(told) == ["t0", "t1", "t2", "t3"]
 
 
-class Hilly(Mission):
+class Tidal(Mission):
     """A mission that asks for what no exported plan tells."""
 
-    constraints = ("path_m", "terrain")
+    constraints = ("path_m", "tide_m")
 
 
 def test_what_plans_do_not_tell_is_refused() -> None:
     require_exportable(mission(LINE, zones=(WALL,)), "s.toml")
 
     with pytest.raises(InputError) as caught:
-        require_exportable(Hilly("m", 60.0, (Uav(U, HOME, 8.0),), (LINE,)), "s.toml")
+        require_exportable(Tidal("m", 60.0, (Uav(U, HOME, 8.0),), (LINE,)), "s.toml")
     assert str(caught.value) == (
-        "s.toml: asks for terrain, which exported plans do not heed; plan without --export"
+        "s.toml: asks for tide_m, which exported plans do not heed; plan without --export"
     )
+
+
+def test_over_hills_every_way_keeps_its_distance_and_ends_in_a_landing(tmp_path: Path) -> None:
+    ridge = load_scenario(resolve_scenario("ridge"))
+    assert ridge.terrain is not None
+    assert ridge.origin is not None
+
+    documents = exported(ridge, tmp_path)
+
+    assert len(documents) == 3
+    assert sum(commands(each).count(206) for each in documents) == 4  # two lines with pictures
+    for document in documents:
+        items = [item for item in document["mission"]["items"] if item["frame"] == 3]
+        assert [item["command"] for item in items[-2:]] == [16, 21]
+        home_m = document["mission"]["plannedHomePosition"][2] - ridge.origin.alt_m
+        flown = []
+        for item in items[:-1]:
+            lat_deg, lon_deg, up_m = item["params"][4:]
+            flat_m = enu_from_wgs84(ridge.origin, lat_deg, lon_deg, 0.0)[:2]
+            flown.append((*flat_m, up_m + home_m))
+        assert above_m(ridge.terrain, np.array(flown)).min() >= ridge.terrain.planned_m - 0.2
+    back = read_task_files([tmp_path / "ridge.uav1.plan"], ImportOptions(has_terrain=True))
+    assert back.entries
 
 
 def test_waits_are_hold_times_and_no_service_when_it_comes_back(tmp_path: Path) -> None:
