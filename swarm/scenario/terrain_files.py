@@ -220,6 +220,12 @@ def _window(name: str, origin: Origin, box: Box) -> _Raster:
         if unit not in ("m", "metre", "meter", "metres", "meters"):
             problem = f"its heights are in {printable(unit)}"
             raise _UnusableError(problem, "give them in metres")
+        if not abs(file.transform.determinant) > 0.0:
+            remedy = "give it a place, such as gdal_translate -a_ullr"
+            raise _UnusableError("does not say where its heights lie", remedy)
+        if "ellipsoidal height" in file.crs.to_wkt(version="WKT2_2019").lower():
+            remedy = "give them above the sea, such as gdalwarp -t_srs EPSG:4326+5773"
+            raise _UnusableError("its heights are above the ellipsoid", remedy)
         block = math.prod(file.block_shapes[0]) * np.dtype(file.dtypes[0]).itemsize
         if block > _MOST_BLOCK:
             remedy = "write it in smaller ones: gdal_translate -co TILED=YES"
@@ -247,7 +253,8 @@ def _window(name: str, origin: Origin, box: Box) -> _Raster:
             remedy = f"give at most {_MOST_PIXELS} of them: gdalwarp -tr makes them fewer"
             raise _UnusableError(problem, remedy)
         part = file.read(1, window=Window(left, top, right - left, bottom - top), masked=True)
-        up_m = np.ma.filled(part.astype(np.float64), np.nan)
+        up_m = np.ma.filled(part.astype(np.float64), np.nan) * file.scales[0] + file.offsets[0]
+        up_m[~np.isfinite(up_m)] = np.nan
         is_geographic = bool(crs.is_geographic) and file.transform.is_rectilinear
 
     def pixel(lat_deg: FloatArray, lon_deg: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -24,8 +24,8 @@ def geotiff(path: Path, heights_m: Any, **given: Any) -> None:
         "transform": Affine(0.0005, 0.0, 8.49, 0.0, -0.0005, 47.41),
         **given,
     }
-    unit = profile.pop("unit", None)
+    about = {name: profile.pop(name) for name in ("units", "scales", "offsets") if name in profile}
     with rasterio.open(path, "w", **profile) as file:
         file.write(heights)
-        if unit is not None:
-            file.units = (unit,)
+        for name, value in about.items():
+            setattr(file, name, (value,))

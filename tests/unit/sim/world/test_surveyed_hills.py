@@ -140,7 +140,7 @@ def test_a_terrain_that_gives_no_heights_is_one_line(
 ) -> None:
     (survey / "text.tif").write_bytes(b"II*\0" + b"\xff" * 2000)
     geotiff(survey / "small.tif", np.full((4, 4), 500.0))
-    geotiff(survey / "feet.tif", np.full((60, 60), 500.0), unit="feet")
+    geotiff(survey / "feet.tif", np.full((60, 60), 500.0), units="feet")
     geotiff(survey / "nan.tif", np.full((60, 60), np.nan))
     fine = {"transform": Affine(1e-6, 0.0, 8.4995, 0.0, -1e-6, 47.4035), "compress": "deflate"}
     geotiff(survey / "huge.tif", np.zeros((5000, 9000), "uint8"), dtype="uint8", **fine)

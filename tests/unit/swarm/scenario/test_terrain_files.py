@@ -222,6 +222,41 @@ def test_what_is_wrong_with_a_geotiff_is_one_line(tmp_path: Path) -> None:
     assert "has no height at 47." in fault(tmp_path, "void.tif")
 
 
+@pytest.mark.parametrize(
+    ("file", "told"),
+    [
+        (
+            {"transform": Affine(5e-4, 0.0, 8.49, 5e-4, 0.0, 47.41)},
+            "does not say where its heights",
+        ),
+        ({"transform": Affine(1e-300, 0.0, 8.49, 0.0, -1e-300, 47.41)}, "does not say where its"),
+        ({"transform": Affine(np.nan, 0.0, 8.49, 0.0, -5e-4, 47.41)}, "does not say where its"),
+        ({"crs": "EPSG:4979"}, "its heights are above the ellipsoid; give them above the sea"),
+        ({"scales": np.nan}, "has no height at 47."),
+        ({"offsets": np.inf}, "has no height at 47."),
+        ({"scales": 1e300}, "has a height of"),
+    ],
+)
+def test_a_geotiff_that_says_nonsense_of_its_heights_is_one_line(
+    tmp_path: Path, file: dict[str, Any], told: str
+) -> None:
+    geotiff(tmp_path / "odd.tif", wgs84_slope(), **file)
+    assert told in fault(tmp_path, "odd.tif")
+
+
+def test_heights_are_what_scale_and_offset_make_of_pixels(tmp_path: Path) -> None:
+    decimetres = np.round((wgs84_slope() - 400.0) * 10.0)
+    geotiff(tmp_path / "dm.tif", decimetres, dtype="int16", scales=0.1, offsets=400.0)
+    assert abs(off_m(load(tmp_path, "dm.tif"))) <= 0.2
+
+
+def test_pixels_that_are_no_numbers_are_no_heights(tmp_path: Path) -> None:
+    heights_m = wgs84_slope()
+    heights_m[15:25, 15:60] = np.inf
+    geotiff(tmp_path / "inf.tif", heights_m)
+    assert "has no height at 47." in fault(tmp_path, "inf.tif")
+
+
 def test_a_truncated_geotiff_is_one_line(tmp_path: Path) -> None:
     geotiff(tmp_path / "hills.tif", wgs84_slope())
     data = (tmp_path / "hills.tif").read_bytes()
