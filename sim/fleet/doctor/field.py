@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from coordinator.mission_view.area_report import facts_in_words
 from coordinator.planner.schedule_report import around
+from sim.fleet.doctor.climbs import check_climbs
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 from swarm.allocation.field import FieldProblem, FieldState
 from swarm.allocation.field.network import TooManyLegsError
@@ -45,6 +46,7 @@ def check_field(mission: Mission) -> list[CheckFinding]:
         *_energy(mission),
         *_bases(mission, problem),
         *_zones(mission, problem),
+        *check_climbs(mission, problem),
         *_tasks(mission, problem),
         *_areas(mission),
     ]

@@ -90,3 +90,21 @@ def test_of_areas_it_is_told_what_lines_cover_and_what_pictures_are_worth() -> N
     assert "1.6 cm a pixel, blur 0.61 px" in told.text
     assert blurred.state is CheckState.WARNING
     assert blurred.text == "hay: pictures are blurred by 1.8 px"
+
+
+def test_legs_over_hills_that_take_longer_than_planned_are_told() -> None:
+    ridge = load_scenario(resolve_scenario("ridge"))
+    slow = replace(ridge, uavs=tuple(replace(each, speed_m_s=5.0) for each in ridge.uavs))
+
+    found, calm = said(ridge)["ground"], said(slow)["ground"]
+
+    assert found.state is CheckState.WARNING
+    assert found.text == (
+        "ways to tasks and back slope by up to 17°: vehicles that climb at 2.5 and sink at 1.5 m/s "
+        "take up to 1.40 times as long as planned"
+    )
+    assert found.remedy == "give a speed_m_s of 5.8, or set them faster"
+    assert calm.state is CheckState.OK
+    assert "ground" not in said(replace(ridge, terrain=None))
+    as_told = tuple(replace(each, speed_m_s=5.8) for each in ridge.uavs)
+    assert said(replace(ridge, uavs=as_told))["ground"].state is CheckState.OK
