@@ -55,7 +55,8 @@ def strips(problem: FieldProblem, areas: Sequence[Sequence[Task]]) -> Lists:
     """Lists of a survey that is shared out before it begins, with visits to bases.
 
     Pieces are of equal length; each is flown from the end that lets its UAV be through sooner.
-    Visits, and the ways in which lines are flown, are those that are best for that order.
+    Visits, and the ways in which lines are flown, are those that are best for that order by itself:
+    where bases have few slots, others may be in the way.
 
     Args:
         problem: of a mission that has these tasks and no others.
@@ -138,13 +139,16 @@ def _set_out_anew(
 ) -> Lists:
     """Lists in which one more sortie, or several, from a base do the ``rest``."""
     landed = [[*own, -1 - base] if uav == heir else own for uav, own in enumerate(lists)]
+    ready_s = _ends_s(problem, landed)[heir][-1]
+    if not np.isfinite(ready_s):  # no slot in time: as if there were one, in its favour
+        ready_s = _through_s(problem, lists, heir, base) + float(problem.swap_s[base])
     state = FieldState.at_start(problem)
     mine = np.arange(problem.n_uav) == heir
     first_s = state.first_s.copy()
     first_s[heir] = problem.leg_s[problem.kind[heir], problem.n_uav + base]
     ready = replace(
         state,
-        free_s=np.where(mine, _ends_s(problem, landed)[heir][-1], state.free_s),
+        free_s=np.where(mine, ready_s, state.free_s),
         first_s=first_s,
         active=mine,
         landed_at=np.where(mine, base, -1),
@@ -155,10 +159,22 @@ def _set_out_anew(
     ]
 
 
+def _through_s(problem: FieldProblem, lists: Lists, uav: int, base: int) -> float:
+    """When a UAV that has done its list is above a base [s mission time]."""
+    node, end_s = uav, 0.0
+    if lists[uav]:
+        item = lists[uav][-1]
+        node, end_s = (
+            int(problem.enter[item >> 1, 1 - (item & 1)]),
+            _ends_s(problem, lists)[uav][-1],
+        )
+    return end_s + float(problem.leg_s[problem.kind[uav], node, problem.n_uav + base])
+
+
 def _ends_s(problem: FieldProblem, lists: Lists) -> list[list[float]]:
-    """When each item ends if the lists are flown together [s mission time]."""
+    """When each item ends if the lists are flown together [s mission time]; infinite: never."""
     flown = fly_lists(problem.kernel, FieldState.at_start(problem), lists)
-    ends_s = iter(flown.times_s[:, 3].tolist())
+    ends_s = iter(np.nan_to_num(flown.times_s[:, 3], nan=np.inf).tolist())
     return [[next(ends_s) for _ in own] for own in lists]
 
 

@@ -131,12 +131,13 @@ def test_who_is_through_first_flies_what_the_lost_one_has_not(lost: int, slots: 
     assert ends_s[heir].max() > before.max()
 
 
-@pytest.mark.parametrize("endurance_s", [None, 100.0])
+@pytest.mark.parametrize("slots", [0, 1])
+@pytest.mark.parametrize("endurance_s", [None, 75.0, 100.0])
 @pytest.mark.parametrize("lost", [0, 1])
 def test_who_lands_first_sets_out_anew_from_the_base_with_a_full_battery(
-    lost: int, endurance_s: float | None
+    lost: int, endurance_s: float | None, slots: int
 ) -> None:
-    problem, lists = shared_out(paddock(endurance_s=endurance_s))
+    problem, lists = shared_out(paddock(endurance_s=endurance_s, slots=slots))
     lost_s = 1.0
     straight_on, _ = taken_over(problem, lists, lost, lost_s)
 
