@@ -263,6 +263,7 @@ class _Flight:
             execute=self._execute,
             snapshot=core.snapshot,
             known=core.replica.digest,
+            register=core.replica.register,
             left_out=lambda: core.replica.overfull,
             save=self._keep,
             answer_s=answer_s,

@@ -35,7 +35,7 @@ from swarm.bus.zenoh_bus import ZenohBus
 from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.messages import Snapshot
+from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.seal import Seal
 from swarm.protocol.timing import PRESETS, LinkKind, Timing
 from swarm.runtime.clock import Clock, SystemClock
@@ -83,6 +83,9 @@ async def run_coordinator(
     def known() -> Mapping[str, int]:
         return core.replica.digest()  # of another one once it has taken over
 
+    def register(key: str) -> Message | None:
+        return core.replica.register(key)
+
     def context() -> Mapping[str, object]:
         epoch = core.replica.epoch
         return {} if epoch is None else {"epoch": epoch.number}
@@ -97,6 +100,7 @@ async def run_coordinator(
         execute=execute,
         snapshot=core.snapshot,
         known=known,
+        register=register,
         left_out=lambda: core.replica.overfull,
         save=None if save is None else lambda now_s: save(core.memory(now_s)),
         answer_s=answer_s,

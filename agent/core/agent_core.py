@@ -40,6 +40,7 @@ from agent.core.states import (
 from agent.core.stop_conditions import BusLossTimer, EndCondition, OperatorCommands
 from agent.core.vehicle_commander import VehicleCommander
 from agent.core.verticals import Verticals
+from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import RuleMaker, rule_of
 from swarm.protocol.events import (
     Finish,
@@ -170,10 +171,13 @@ class AgentCore(AgentPart):
             now_s: now, on this process's own clock [s]; never decreases.
         """
         self._mission_view.now_s = now_s
-        if isinstance(event, Telemetry) and self._changes_nothing_else(now_s):
+        if isinstance(event, Telemetry) and self._is_place_alone(now_s):
             self._mission_view.move(event)
             if not self._tasking.measure(now_s):
                 return []
+        if isinstance(event, MessageReceived) and self._is_repeated(event.message, now_s):
+            self._peers.heard(event.message, self.replica, now_s)
+            return []
         if not self._machine.has_ended:
             if self._stall_detector.late(now_s):
                 self._sync.held_up(now_s)
@@ -274,11 +278,23 @@ class AgentCore(AgentPart):
         else:
             self._sync.learn(snapshots, now_s)
 
-    def _changes_nothing_else(self, now_s: float) -> bool:
+    def _is_place_alone(self, now_s: float) -> bool:
         """Whether nothing follows from where the vehicle is: known before, and nothing is due."""
+        return self._mission_view.place_enu_m is not None and self._is_idle(now_s)
+
+    def _is_repeated(self, message: Message, now_s: float) -> bool:
+        """Whether nothing follows from ``message`` but that its writer lives.
+
+        Another UAV repeats what is known of it, whose word counts already, and nothing is due.
+        """
+        counts = self._peers.membership.is_credible(message.writer)
+        is_known = counts and self.replica.known(message) is message
+        return is_known and message.writer != COORDINATOR and self._is_idle(now_s)
+
+    def _is_idle(self, now_s: float) -> bool:
+        """Whether nothing is due."""
         due = self._deadline_s is not None and self._deadline_s <= now_s
-        known = self._mission_view.place_enu_m is not None
-        return known and not (due or self._machine.has_ended)
+        return not (due or self._machine.has_ended)
 
     # -- what follows from the state ------------------------------------------------
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 
 from swarm.protocol.events import Publish
@@ -33,6 +34,11 @@ class Announcer:
         self._claim_key = KeySpace(register_writer.mission).claim(register_writer.writer)
         self._note = self._caution = ""
         self._turn = 0
+        self._stretch = 1.0
+        self._news: set[str] = set()
+        """Keys of own registers with something new since the last announcement."""
+        self._free_at_s = -math.inf
+        """When somebody may be greeted again."""
         self._announce_at_s: float | None = None
         self._status_at_s: float | None = None
 
@@ -62,8 +68,13 @@ class Announcer:
     def say(self, body: Body) -> Publish:
         """State the new content of an own register, or what is none: status and choice."""
         message = self._register_writer.say(body)
-        self._replica.join(message)
+        if self._replica.join(message):
+            self._news.add(message.key)
         return Publish(message)
+
+    def stretch(self, stretch: float) -> None:
+        """From now on repeat what is not new that much more seldom; see `stretch_of`."""
+        self._stretch = stretch
 
     def remember(self, message: Message) -> None:
         """An earlier life said so, and this one has claimed nothing yet."""
@@ -90,15 +101,23 @@ class Announcer:
     def announce(self, now_s: float) -> list[Publish]:
         """Repeat the own registers, so that what got lost on the way arrives after all.
 
-        Outcomes take turns, so that the bus stays quiet however many there are.
+        Outcomes take turns, so that the bus stays quiet however many there are. In a fleet where
+        repetitions are stretched, everything but the claim does, and all that is new is told.
         """
         own = list(self._replica.messages({self._register_writer.writer}))
-        said = [message for message in own if isinstance(message.body, Claim | Calibration)]
-        outcomes = [message for message in own if isinstance(message.body, Outcome)]
-        for _ in range(min(_OUTCOMES_AT_ONCE, len(outcomes))):
-            self._turn = (self._turn + 1) % len(outcomes)
-            said.append(outcomes[self._turn])
-        self._announce_at_s = now_s + self._timing.announce_s
+        if self._stretch > 1.0:
+            always = {self._claim_key, *self._news}
+            at_once = 1
+        else:
+            always = {m.key for m in own if isinstance(m.body, Claim | Calibration)}
+            at_once = _OUTCOMES_AT_ONCE
+        said = [message for message in own if message.key in always]
+        rest = [message for message in own if message.key not in always]
+        for _ in range(min(at_once, len(rest))):
+            self._turn = (self._turn + 1) % len(rest)
+            said.append(rest[self._turn])
+        self._news.clear()
+        self._announce_at_s = now_s + self._stretch * self._timing.announce_s
         return [
             self.say(message.body)
             if message.stamp.incarnation == REVOKED_INCARNATION
@@ -106,9 +125,19 @@ class Announcer:
             for message in said
         ]
 
+    def greet(self, now_s: float) -> list[Publish]:
+        """Somebody is there anew: repeat the own registers, once for all who come together."""
+        if now_s >= self._free_at_s:
+            self._free_at_s = now_s + self._timing.ask_gap_s
+            return self.announce(now_s)
+        self._announce_at_s = earliest(self._announce_at_s, self._free_at_s)
+        return []
+
     def repeat(self, status: Callable[[], Status], now_s: float, *, learned: bool) -> list[Publish]:
         """What is due again by now; registers only once they are ``learned`` to be news at all."""
         said: list[Publish] = []
+        if self._news and self._announce_at_s is not None:  # soon, however seldom the rest
+            self._announce_at_s = min(self._announce_at_s, now_s + self._timing.announce_s)
         if learned and (self._announce_at_s is None or self._announce_at_s <= now_s):
             said += self.announce(now_s)
         if self._status_at_s is None or self._status_at_s <= now_s:

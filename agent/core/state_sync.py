@@ -28,7 +28,7 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.registers import without_signers
 from swarm.protocol.sync import QuestionTimer
-from swarm.protocol.timing import Timing, earliest
+from swarm.protocol.timing import Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import ClaimPhase
 
 _WORTH_TELLING_S = 0.1
@@ -162,6 +162,10 @@ class StateSync(AgentPart):
         news = self._mission_view.take_in(message)
         if news is None:
             return
+        if isinstance(message.body, MissionConfig):
+            stretch = stretch_of(len(message.body.uavs))
+            self._announcer.stretch(stretch)
+            self._peers.membership.stretch(stretch)
         self._peers.stated(message.writer, message.body, now_s)
         if news is MissionChange.APPEARANCE and isinstance(message.body, TaskEntry | TaskEdit):
             self._tasking.consider_diversion(message.body.task)
@@ -214,7 +218,7 @@ class StateSync(AgentPart):
         self._peers.membership.link(up, now_s)
         if up and self.queries.ever:
             self._catch_up(now_s)
-            self._announce(now_s)
+            self._greet_all(now_s)
 
     def held_up(self, now_s: float) -> None:
         """This process was stopped or starved; what the others did meanwhile is unread."""
@@ -237,14 +241,14 @@ class StateSync(AgentPart):
         if back := self._peers.back(writer):
             self._log("back", writer=writer)
         if self.queries.ever:
-            self._announce(now_s)
+            self._greet_all(now_s)
             if back or writer == COORDINATOR:
                 self.queries.want(now_s)
 
-    def _announce(self, now_s: float) -> None:
+    def _greet_all(self, now_s: float) -> None:
         """Repeat the own registers; what an earlier life said is not this one's to repeat."""
         if self._machine.acts:
-            self._actions += self._announcer.announce(now_s)
+            self._actions += self._announcer.greet(now_s)
 
     def _awake(self, now_s: float) -> None:
         """A task may have opened: everyone who is free decides anew, in sequence order."""

@@ -6,11 +6,7 @@ By itself, so that planning need not load what a coordinator publishes.
 from __future__ import annotations
 
 from swarm.model import Mission
-from swarm.model.layers import FlightLayers
-
-HIGHEST_M = 120.0
-"""Above it unmanned aircraft need a permit of their own in the EU, Britain and Switzerland; 122 m
-(400 ft) in the USA."""
+from swarm.model.layers import HIGHEST_M, FlightLayers
 
 
 def height_warning(mission: Mission, layers: FlightLayers) -> str | None:

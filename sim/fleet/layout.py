@@ -21,6 +21,7 @@ from swarm.bus.loopback import free_loopback_endpoints
 from swarm.identity import load_identity
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
+from swarm.model.layers import HIGHEST_M, FlightLayers, layers_below, layers_over
 from swarm.protocol.timing import LinkKind, preset
 from swarm.runtime.log import LogFormat
 
@@ -30,6 +31,8 @@ OWN_AUTOPILOT_LIMIT = 20
 """Largest fleet in which every simulated autopilot is a process of its own."""
 VEHICLES_PER_PROCESS = 25
 """Simulated autopilots in one process of a larger fleet."""
+LEAST_POSITION_RATE_HZ = 5.0
+"""Wall rate of position reports of the largest fleets."""
 ONLOOKER = "onlooker"
 DASHBOARD = "the dashboard"
 """What its process is called; no UAV can be."""
@@ -211,6 +214,7 @@ class Layout:
             str(options.scenario),
             *("--method", options.method, "--seed", str(options.seed), "--json"),
             *("--start-timeout-s", repr(options.start_timeout_s)),
+            *("--layer-spacing-m", repr(flight_layers(self._mission, options).spacing_m)),
             *self._log(),
             *self._memory(),
             *self._speed(),
@@ -309,13 +313,21 @@ def _repeated(option: str, values: Sequence[str]) -> list[str]:
     return [word for value in values for word in (option, value)]
 
 
+def flight_layers(mission: Mission, options: LaunchOptions) -> FlightLayers:
+    """Heights at which the UAVs fly: simulated ones never so high that they climb for long."""
+    usual = layers_over(mission.terrain)
+    if not isinstance(options.autopilots, SimulatedAutopilots):
+        return usual
+    return layers_below(HIGHEST_M, len(mission.uavs), usual)
+
+
 def default_position_rate_hz(n_uav: int) -> float:
     """Wall rate of each UAV's position reports.
 
     An arrival is seen at the next report, so legs grow by half an interval; a machine
-    handles some 2000 reports a second beside everything else.
+    handles some 1000 reports a second beside everything else.
     """
-    return min(100.0, 2000.0 / max(1, n_uav))
+    return max(LEAST_POSITION_RATE_HZ, min(100.0, 1000.0 / max(1, n_uav)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -17,12 +17,11 @@ from rich.console import Console
 
 from coordinator.core.heights import height_warning
 from coordinator.terminal.live_view import LiveView
-from sim.fleet.layout import LaunchOptions
+from sim.fleet.layout import LaunchOptions, flight_layers
 from sim.fleet.run import fly
 from sim.fleet.security import security_of
 from sim.options import print_report
 from swarm.model import Mission
-from swarm.model.layers import layers_over
 from swarm.protocol.timing import Timing
 from swarm.runtime.errors import Fault, InputError
 
@@ -65,9 +64,8 @@ class ShownRun:
         """Say what a person should know before the start."""
         for line in () if options.dashboard is None else options.dashboard.lines:
             self._say(line)
-        if (
-            warning := height_warning(self._mission, layers_over(self._mission.terrain))
-        ) is not None:
+        layers = flight_layers(self._mission, options)
+        if (warning := height_warning(self._mission, layers)) is not None:
             self._say(f"warning: {warning}")
 
     async def fly(self, options: LaunchOptions) -> int:

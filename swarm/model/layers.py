@@ -29,6 +29,20 @@ class FlightLayers:
         return self.lowest_m + index * self.spacing_m
 
 
+HIGHEST_M = 120.0
+"""Above it unmanned aircraft need a permit of their own in the EU, Britain and Switzerland; 122 m
+(400 ft) in the USA."""
+
+
+def layers_below(highest_m: float, n_uav: int, layers: FlightLayers) -> FlightLayers:
+    """Those layers, closer to each other where the highest of ``n_uav`` would be too high.
+
+    Vehicles that climb at 2.5 m/s need two minutes to the highest of a hundred layers 3 m apart.
+    """
+    room_m = max(0.0, highest_m - layers.lowest_m) / max(1, n_uav - 1)
+    return FlightLayers(layers.lowest_m, min(layers.spacing_m, room_m))
+
+
 def layers_over(terrain: Terrain | None, layers: FlightLayers | None = None) -> FlightLayers:
     """Those layers, or the usual ones, the lowest as far from the ground as paths are planned."""
     usual = FlightLayers() if layers is None else layers

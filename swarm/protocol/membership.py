@@ -20,6 +20,7 @@ class Membership:
 
     def __init__(self, timing: Timing) -> None:
         self._timing = timing
+        self._silence_s = timing.silence_s
         self._linked = True
         self._heard: set[str] = set()
         """Who has ever said something, here or elsewhere; silence means nothing of others."""
@@ -28,7 +29,7 @@ class Membership:
         self._silent_at_s: dict[str, float] = {}
         """Present writers that have been heard, and when each is lost unless it speaks again.
 
-        Everyone has equally long from when it was last heard, so they are in order of time."""
+        UAVs have equally long from when they were last heard, so they are in order of time."""
         self._mute: set[str] = set()
         """Lost by silence, with a living token."""
         self._interrupted: set[str] = set()
@@ -66,6 +67,13 @@ class Membership:
         return writer in self._gone_until_s
 
     # -- what is observed -------------------------------------------------------------
+
+    def stretch(self, stretch: float) -> None:
+        """From now on UAVs repeat themselves that much more seldom; see `stretch_of`."""
+        later_s = stretch * self._timing.silence_s - self._silence_s
+        self._silence_s += later_s
+        for writer in self._silent_at_s.keys() - {COORDINATOR}:
+            self._silent_at_s[writer] += later_s
 
     def seen(self, writer: str, now_s: float) -> bool:
         """``writer``'s token is there; whether the writer is thereby present anew.
@@ -149,7 +157,8 @@ class Membership:
         """When `lost` may next have something to tell; once it has been asked, in the future."""
         if not self._linked:
             return None
-        silent_s = next(iter(self._silent_at_s.values()), None)
+        first_s = next(iter(self._silent_at_s.values()), None)
+        silent_s = earliest(first_s, self._silent_at_s.get(COORDINATOR))
         if not self._gone_until_s:
             return silent_s
         return earliest(silent_s, min(self._gone_until_s.values()))
@@ -165,11 +174,14 @@ class Membership:
     def _wait_for(self, writer: str, now_s: float) -> None:
         """``writer`` shall speak again: of all it has the longest until then."""
         self._silent_at_s.pop(writer, None)
-        self._silent_at_s[writer] = now_s + self._timing.silence_s
+        self._silent_at_s[writer] = now_s + self._patience_s(writer)
 
     def _grant_grace(self, now_s: float) -> None:
         """Everyone gets the time to show its token, and to speak, that it would need anew."""
         gone_s = now_s + self._timing.relink_grace_s
-        silent_s = now_s + self._timing.silence_s
         self._gone_until_s = dict.fromkeys(self._gone_until_s, gone_s)
-        self._silent_at_s = dict.fromkeys(self._silent_at_s, silent_s)
+        self._silent_at_s = {w: now_s + self._patience_s(w) for w in self._silent_at_s}
+
+    def _patience_s(self, writer: str) -> float:
+        """How long ``writer`` may be silent; the coordinator speaks as often in every fleet."""
+        return self._timing.silence_s if writer == COORDINATOR else self._silence_s

@@ -92,6 +92,19 @@ class Timing:
         return Timing(*(value * speedup for value in dataclasses.astuple(self)))
 
 
+UNSTRETCHED_UAVS: Final = 25
+"""Largest fleet in which everybody repeats itself as often as its link asks for."""
+
+
+def stretch_of(n_uav: int) -> float:
+    """By what `announce_s` and `silence_s` of UAVs grow in a fleet of that size.
+
+    Everybody hears everybody's repetitions, so these come the more seldom the more there are:
+    what one process hears of them in a second does not grow beyond `UNSTRETCHED_UAVS`.
+    """
+    return max(1.0, n_uav / UNSTRETCHED_UAVS)
+
+
 class LinkKind(StrEnum):
     """What kind of network the processes of a fleet reach each other by."""
 

@@ -88,6 +88,7 @@ class Shell(Generic[E, A]):
         snapshot: answers a query; None for a process that answers none.
         known: digest of the registers the core knows; answers to it leave those out, and
             its own answers what the asker knows.
+        register: of what the core knows, the statement on a key; None where there is none.
         left_out: how many registers the core has had no room for so far.
         save: keeps the core's memory, given ``now_s``; None to keep nothing.
         answer_s: how long a question waits for the slowest answer [wall s].
@@ -107,6 +108,7 @@ class Shell(Generic[E, A]):
         execute: Callable[[A], None],
         snapshot: Callable[[float], Snapshot] | None,
         known: Callable[[], Mapping[str, int]] = dict,
+        register: Callable[[str], Message | None] = lambda _: None,
         left_out: Callable[[], int] = int,
         save: Callable[[float], None] | None = None,
         answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
@@ -136,6 +138,7 @@ class Shell(Generic[E, A]):
         )
         self._from_bus = from_bus
         self._execute = execute
+        self._register = register
         self._left_out = left_out
         self._save = save
         self._context = context
@@ -325,7 +328,7 @@ class Shell(Generic[E, A]):
     def _fact(self, event: BusEvent) -> CommonEvent | None:
         match event:
             case Sample(key, payload):
-                message = self._codec.decode(key, payload)
+                message = self._codec.decode(key, payload, self._register(key))
                 if message is None:
                     return None
                 self._tell_newer()

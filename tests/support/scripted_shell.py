@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from swarm.protocol.events import CommonAction, CommonEvent, Finish, Stop, Tick
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.messages import Snapshot
+from swarm.protocol.messages import Message, Snapshot
 from swarm.runtime.shell import Shell, join_mission
 from tests.support.builders import MISSION, held, message
 from tests.support.memory_bus import MemoryBus, MemoryNetwork
@@ -87,6 +87,7 @@ async def at_work(
     answers: bool = True,
     snapshot: Snapshot = SNAPSHOT,
     known: Mapping[str, int] | None = None,
+    register: Callable[[str], Message | None] = lambda _: None,
     left_out: Callable[[], int] = int,
     save: Callable[[float], None] | None = None,
     capacity: int = 4096,
@@ -113,6 +114,7 @@ async def at_work(
         execute=execute or remember,
         snapshot=(lambda _: snapshot) if answers else None,
         known=lambda: known or {},
+        register=register,
         left_out=left_out,
         save=save,
     )

@@ -12,18 +12,22 @@ import numpy as np
 import pytest
 
 from coordinator.dashboard.access import ServeAddress
+from sim.fleet.autopilots import RunningVehicles
 from sim.fleet.keys import RunKeys
 from sim.fleet.layout import (
     AUTO_MESH_LIMIT,
+    LEAST_POSITION_RATE_HZ,
     ONLOOKER,
     BusKind,
     LaunchOptions,
     Layout,
     autopilot_groups,
     default_position_rate_hz,
+    flight_layers,
 )
 from swarm.bus.config import ClientTopology, MeshTopology
 from swarm.model.ids import COORDINATOR
+from swarm.model.layers import FlightLayers
 from tests.support.builders import MISSION, mission, task, uav
 
 OPTIONS = LaunchOptions(
@@ -276,5 +280,19 @@ def test_every_uav_has_its_autopilot_in_one_process(n_uav: int) -> None:
 def test_the_fleets_position_reports_stay_within_what_a_machine_handles(n_uav: int) -> None:
     rate_hz = default_position_rate_hz(n_uav)
 
-    assert 0.0 < rate_hz <= 100.0
-    assert rate_hz * n_uav <= 2000.0
+    assert 5.0 <= rate_hz <= 100.0
+    assert rate_hz * n_uav <= 1000.0 or rate_hz == LEAST_POSITION_RATE_HZ
+
+
+@pytest.mark.parametrize("n_uav", [1, 37, 38, 100, 1000])
+def test_simulated_fleets_fly_no_higher_than_one_may_and_real_ones_as_told(
+    n_uav: int,
+) -> None:
+    fleet, usual = mission([uav(f"u{n}") for n in range(n_uav)], [task("t0", 1.0)]), FlightLayers()
+    simulated = flight_layers(fleet, OPTIONS)
+
+    assert simulated.layer_m(n_uav - 1) <= 120.0 + 1e-9
+    assert (simulated == usual) == (usual.layer_m(n_uav - 1) <= 120.0)
+    heights_m = {simulated.layer_m(index) for index in range(n_uav)}
+    assert len(heights_m) == n_uav
+    assert flight_layers(fleet, replace(OPTIONS, autopilots=RunningVehicles(()))) == usual

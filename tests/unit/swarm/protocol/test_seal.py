@@ -22,6 +22,7 @@ from swarm.protocol.messages import (
     Snapshot,
     Stamp,
     as_heard,
+    demoted,
 )
 from swarm.protocol.seal import ANSWER, Seal, UnacceptableError, open_envelope
 from tests.support.builders import MISSION, choice, done, entry, epoch, held, message, status
@@ -75,6 +76,21 @@ def test_what_its_writer_has_signed_comes_through_with_its_envelope(
     assert (heard.said, heard.envelope) == (encode(said), packed)
     assert codec.pack(heard) == packed, "it is repeated as it was heard"
     assert codec.dropped.total() == 0
+
+
+def test_a_statement_that_is_only_repeated_is_the_one_that_was_believed() -> None:
+    codec = Codec(MISSION, KEYS.seal("u1"))
+    packed = Codec(MISSION, KEYS.seal("u0")).pack(CLAIM)
+    assert packed is not None
+    known = codec.decode(CLAIM.key, packed)
+    assert known is not None
+
+    assert codec.decode(CLAIM.key, packed, known) is known
+    assert codec.decode(CLAIM.key, encode(CLAIM), known) is None, "unsigned, as it says"
+    gone = demoted(known)
+    again = codec.decode(CLAIM.key, packed, gone)
+    assert again is not gone, "nobody stands for that any more, so it is checked anew"
+    assert again == known
 
 
 @given(st.binary(max_size=300), st.sampled_from([b"", b"question", ANSWER + NONCE]))

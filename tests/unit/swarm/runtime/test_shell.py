@@ -27,6 +27,7 @@ from swarm.protocol.events import (
     Tick,
 )
 from swarm.protocol.messages import Message, Snapshot
+from swarm.protocol.registers import Replica
 from swarm.runtime.errors import BusError
 from swarm.runtime.shell import Shell, join_mission
 from tests.support.builders import (
@@ -268,6 +269,34 @@ def test_a_core_ticks_when_its_deadline_has_come_and_not_before() -> None:
             assert core.heard.count(Tick()) == 1
 
     play(scenario)
+
+
+def test_what_is_only_repeated_reaches_the_core_as_what_it_knows() -> None:
+    async def scenario() -> None:
+        replica = Replica()
+
+        def join(event: CommonEvent) -> list[Action]:
+            if isinstance(event, MessageReceived):
+                replica.join(event.message)
+            return []
+
+        core = ScriptedCore(join)
+        async with at_work(core, register=replica.register) as played:
+            later = message("u1", held("t1", 2.0), 2)
+            for said in (CLAIM, CLAIM, later, later):
+                played.other.publish(said.key, encode(said))
+            await until(lambda: len(heard(core)) == 4, "the words")
+            first, again, new, new_again = heard(core)
+            assert again is first
+            assert new is not first
+            assert new_again is new
+            assert (first, new) == (CLAIM, later)
+
+    play(scenario)
+
+
+def heard(core: ScriptedCore) -> list[Message]:
+    return [event.message for event in core.heard if isinstance(event, MessageReceived)]
 
 
 @pytest.mark.parametrize("exit_status", [0, 1])

@@ -1,0 +1,149 @@
+"""How seldom an agent repeats itself in a large fleet, and what is told soon all the same."""
+
+from __future__ import annotations
+
+import pytest
+
+from agent.core.interface import Action
+from swarm.model.ids import COORDINATOR
+from swarm.protocol.events import MessageReceived, PeerGone, PeerSeen, Publish
+from swarm.protocol.key_space import KeySpace
+from swarm.protocol.messages import Message
+from swarm.protocol.timing import UNSTRETCHED_UAVS, Timing, stretch_of
+from swarm.protocol.uav_messages import Claim, Outcome, Status
+from tests.support.builders import MISSION, entry, held, uav
+from tests.support.lone_agent import LoneAgent, claims, notes, outcomes
+
+TIMING = Timing()
+SIZES = (25, 50, 100, 200)
+
+
+def fleet(n_uav: int, tasks: int = 8) -> LoneAgent:
+    """``u0`` on its way in a running mission, all others idle; the nearest task comes first."""
+    agent = LoneAgent(*(uav(f"u{n}") for n in range(n_uav)), timing=TIMING)
+    agent.fly_to(*(entry(f"t{n}", east_m=10.0 + n, number=n) for n in range(tasks)))
+    agent.start_mission()
+    agent.run_until(0.5)
+    agent.learn()
+    return agent
+
+
+def repeated(actions: list[Action]) -> list[Message]:
+    """Registers that were published."""
+    said = [action.message for action in actions if isinstance(action, Publish)]
+    return [message for message in said if isinstance(message.body, Claim | Outcome)]
+
+
+def keep_alive(agent: LoneAgent, until_s: float, every_s: float = 1.0) -> list[Action]:
+    """Let time go on while all others repeat what they have said."""
+    keys = KeySpace(MISSION)
+    others = [keys.plan, *(keys.claim(f"u{n}") for n in range(1, len(agent.uavs)))]
+    said = [agent.core.replica.register(key) for key in others]
+    actions: list[Action] = []
+    at_s = agent.now_s - 200.0
+    while at_s < until_s:
+        at_s += every_s
+        for message in said:
+            assert message is not None
+            actions += agent.happen(MessageReceived(message))
+        actions += agent.run_until(at_s)
+    return actions
+
+
+@pytest.mark.parametrize("n_uav", SIZES)
+def test_what_one_hears_of_repetitions_does_not_grow_with_the_fleet(n_uav: int) -> None:
+    agent = fleet(n_uav)
+    agent.arrive(1.0)
+    keep_alive(agent, 20.0)
+    period_s = stretch_of(n_uav) * TIMING.announce_s
+
+    said = repeated(keep_alive(agent, 20.0 + 10.0 * period_s))
+
+    heard_hz = len(said) * n_uav / (10.0 * period_s)
+    assert 0.9 * UNSTRETCHED_UAVS / TIMING.announce_s < heard_hz
+    assert heard_hz < 2.2 * UNSTRETCHED_UAVS / TIMING.announce_s
+
+
+@pytest.mark.parametrize("n_uav", SIZES)
+def test_what_is_new_is_repeated_as_soon_as_in_a_small_fleet(n_uav: int) -> None:
+    agent = fleet(n_uav)
+    keep_alive(agent, 20.0)
+    agent.arrive(20.0 if agent.now_s < 220.0 else agent.now_s - 200.0)
+    ended_s = agent.now_s - 200.0
+    keep_alive(agent, ended_s, every_s=0.1)
+
+    again = keep_alive(agent, ended_s + TIMING.announce_s + 0.2, every_s=0.1)
+
+    assert "t0" in {outcome.task for outcome in outcomes(again)}
+    assert "t1" in {claim.task for claim in claims(again)}
+
+
+def test_many_who_come_together_are_greeted_together() -> None:
+    agent = fleet(100)
+    keep_alive(agent, 5.0)
+    before = len(agent.log)
+    for n in range(1, 60):
+        agent.happen(PeerGone(f"u{n}"))
+    agent.run_until(agent.now_s - 200.0 + 2.0 * TIMING.loss_delay_s)
+    for n in range(1, 60):
+        agent.happen(PeerSeen(f"u{n}"))
+    agent.run_until(agent.now_s - 200.0 + 1.5 * TIMING.ask_gap_s)
+
+    assert notes(agent.log[before:]).count("back") == 59
+    assert 1 <= len(claims(agent.log[before:])) <= 4
+
+
+def test_a_uav_of_a_large_fleet_may_be_silent_longer_and_the_coordinator_may_not() -> None:
+    agent = fleet(100)
+    silence_s = stretch_of(100) * TIMING.silence_s
+    began_s = agent.now_s - 200.0
+
+    actions = agent.run_until(began_s + TIMING.silence_s + 1.0)
+    told = [dict(a.fields) for a in actions if getattr(a, "text", "") == "lost"]
+    assert [fields["writer"] for fields in told] == [COORDINATOR]
+
+    actions = agent.run_until(began_s + silence_s + 1.0)
+    told = [dict(a.fields) for a in actions if getattr(a, "text", "") == "lost"]
+    assert len(told) == 99
+
+
+def test_a_word_that_is_only_repeated_keeps_its_writer_alive_and_changes_nothing_else() -> None:
+    agent = fleet(3)
+    said = agent.statement("u1", held("t5", 50.0))
+    agent.happen(MessageReceived(said))
+    agent.hear("u2", held("t6", 50.0))
+    agent.run_until(1.0)
+    deadline_s = agent.core.next_deadline_s()
+
+    assert agent.happen(MessageReceived(said)) == []
+    assert agent.core.next_deadline_s() == deadline_s
+
+    for _ in range(20):
+        agent.run_until(agent.now_s - 200.0 + 0.45 * TIMING.silence_s)
+        agent.happen(MessageReceived(said))
+    lost = [a.fields["writer"] for a in agent.log if getattr(a, "text", "") == "lost"]
+    assert "u2" in lost
+    assert "u1" not in lost
+
+
+def test_a_repeated_word_of_one_who_was_lost_makes_its_claim_count_again() -> None:
+    agent = fleet(3)
+    said = agent.statement("u1", held("t5", 50.0))
+    agent.happen(MessageReceived(said))
+    agent.happen(PeerGone("u1"))
+    agent.run_until(agent.now_s - 200.0 + 2.0 * TIMING.loss_delay_s)
+    agent.happen(PeerSeen("u1"))
+    credible = agent.core._peers.membership.is_credible
+
+    assert not credible("u1")
+    agent.happen(MessageReceived(said))
+    assert credible("u1")
+
+
+def test_statuses_come_as_often_in_every_fleet() -> None:
+    counts = []
+    for n_uav in SIZES:
+        agent = fleet(n_uav)
+        said = [a.message for a in keep_alive(agent, 20.0) if isinstance(a, Publish)]
+        counts.append(sum(isinstance(message.body, Status) for message in said))
+    assert len(set(counts)) == 1
