@@ -262,6 +262,7 @@ class _Flight:
             from_bus=lambda fact: fact,
             execute=self._execute,
             snapshot=core.snapshot,
+            whole=core.whole,
             known=core.replica.digest,
             register=core.replica.register,
             left_out=lambda: core.replica.overfull,

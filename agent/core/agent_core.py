@@ -11,7 +11,7 @@ others in agent.core.state_sync. Leaves out: flying (agent.vehicle) and transpor
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from agent.core.announcer import Announcer
@@ -159,7 +159,7 @@ class AgentCore(AgentPart):
     def start(self, now_s: float) -> list[Action]:
         """What to do first."""
         self._recovered.begin(now_s)
-        self._queries.doubt(now_s)
+        self._queries.doubt(now_s, everyone=True)
         self._actions += self._queries.questions(now_s, lacking=True)
         return self._end_step(now_s)
 
@@ -211,14 +211,18 @@ class AgentCore(AgentPart):
         )
 
     def snapshot(self, now_s: float) -> Snapshot:
-        """What this process answers for: its own registers, and those of who cannot.
+        """What this process answers for: its own registers, and those of who cannot."""
+        return self._answer(self._peers.membership.steady, now_s)
 
-        As long as it syncs itself, it has nothing to tell.
-        """
+    def whole(self, now_s: float) -> Snapshot:
+        """What it tells one who asks some for all they know: the coordinator is among them."""
+        return self._answer(self._peers.membership.steady & {COORDINATOR}, now_s)
+
+    def _answer(self, others: Collection[str], now_s: float) -> Snapshot:
+        """All it knows but what ``others`` answer for; nothing as long as it syncs itself."""
         if self.state in (AgentState.SYNCING, AgentState.YIELDED):
             return self._snapshot_of((), now_s)
-        steady = self._peers.membership.steady
-        return self._snapshot_of(self.replica.answers(self.uav, steady), now_s)
+        return self._snapshot_of(self.replica.answers(self.uav, others), now_s)
 
     def memory(self, now_s: float) -> Snapshot:
         """Everything it knows, for a later life of this agent."""
@@ -316,7 +320,8 @@ class AgentCore(AgentPart):
         self._go_home_if_spent(now_s)
         if not self._machine.has_ended:
             lacking = self.state is AgentState.SYNCING
-            self._actions += self._queries.questions(now_s, lacking=lacking)
+            there = self._peers.membership.present
+            self._actions += self._queries.questions(now_s, lacking=lacking, present=there)
             self._actions += self._announcer.repeat(
                 lambda: self._status(now_s), now_s, learned=self._machine.acts
             )

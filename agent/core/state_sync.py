@@ -27,7 +27,7 @@ from swarm.protocol.messages import (
     TaskEntry,
 )
 from swarm.protocol.registers import without_signers
-from swarm.protocol.sync import QuestionTimer
+from swarm.protocol.sync import QuestionTimer, some_of
 from swarm.protocol.timing import Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import ClaimPhase
 
@@ -44,7 +44,7 @@ class StateSync(AgentPart):
 
     def __init__(self, context: AgentContext, tasking: Tasking) -> None:
         super().__init__(context)
-        self.queries = StateQueries(context.timing)
+        self.queries = StateQueries(context.uav, context.timing)
         self._tasking = tasking
         self._answered: set[str] = set()
         self._insisted = False
@@ -115,15 +115,15 @@ class StateSync(AgentPart):
             return
         if not self._machine.acts and not self._insisted:
             self._insisted = True
-            self.queries.doubt(now_s)
+            self.queries.doubt(now_s, of=silent)
         elif self._machine.acts and now_s < self._insists_until_s:
-            self.queries.doubt(now_s + 2.0 * self._timing.ask_gap_s)
+            self.queries.doubt(now_s + 2.0 * self._timing.ask_gap_s, of=silent)
 
-    def _catch_up(self, now_s: float) -> None:
+    def _catch_up(self, now_s: float, *, everyone: bool) -> None:
         """What the others did meanwhile is unknown, and they may be back later than this one."""
         self._answered.clear()
         self._insists_until_s = now_s + self._timing.relink_grace_s
-        self.queries.doubt(now_s)
+        self.queries.doubt(now_s, everyone=everyone)
 
     def remember(self, memory: Snapshot, now_s: float) -> None:
         """An earlier life of this agent knew so."""
@@ -217,13 +217,13 @@ class StateSync(AgentPart):
         """The own link came up or went down."""
         self._peers.membership.link(up, now_s)
         if up and self.queries.ever:
-            self._catch_up(now_s)
+            self._catch_up(now_s, everyone=True)
             self._greet_all(now_s)
 
     def held_up(self, now_s: float) -> None:
         """This process was stopped or starved; what the others did meanwhile is unread."""
         self._peers.membership.held_up(now_s)
-        self._catch_up(now_s)
+        self._catch_up(now_s, everyone=False)  # what was said meanwhile has yet to be read
         self._log("held up")
 
     def lose(self, now_s: float) -> None:
@@ -243,7 +243,7 @@ class StateSync(AgentPart):
         if self.queries.ever:
             self._greet_all(now_s)
             if back or writer == COORDINATOR:
-                self.queries.want(now_s)
+                self.queries.want(now_s, {writer})
 
     def _greet_all(self, now_s: float) -> None:
         """Repeat the own registers; what an earlier life said is not this one's to repeat."""
@@ -257,9 +257,9 @@ class StateSync(AgentPart):
 
 
 class StateQueries:
-    """Whether what one agent knows is up to date, and when it asks everyone for more."""
+    """Whether what the agent ``own`` knows is up to date, when it asks for more, and whom."""
 
-    def __init__(self, timing: Timing) -> None:
+    def __init__(self, own: str, timing: Timing) -> None:
         self.ever = False
         """Whether any question has been answered, be it by nobody."""
         self.current = False
@@ -271,15 +271,25 @@ class StateQueries:
         """Questions without an answer."""
         self._outdated = 0
         """Those of them that were asked before the last doubt."""
+        self._own = own
+        self._everyone = False
+        self._wanted: set[str] = set()
+        """Whom the next question is for at any rate."""
+        self._turn = 0
 
-    def want(self, now_s: float) -> None:
-        """Others may have news."""
+    def want(self, now_s: float, of: Collection[str] = ()) -> None:
+        """Others may have news, those ``of`` whom it is wanted above all."""
+        self._wanted.update(of)
         self._asking.want(now_s)
 
-    def doubt(self, now_s: float) -> None:
-        """What is known is old: nothing is decided before everyone has been asked."""
+    def doubt(self, now_s: float, of: Collection[str] = (), *, everyone: bool = False) -> None:
+        """What is known is old: nothing is decided before others have been asked.
+
+        ``everyone`` of them, where what each has said meanwhile may have reached nobody else.
+        """
         self.current, self._outdated = False, self._open
-        self._asking.want(now_s)
+        self._everyone |= everyone
+        self.want(now_s, of)
 
     def take(self, *, enough: bool) -> None:
         """Answers have come; ``enough`` if they are up to date whenever they were asked for."""
@@ -287,8 +297,8 @@ class StateQueries:
         self.current |= enough or self._open > self._outdated == 0
         self._open, self._outdated = max(0, self._open - 1), max(0, self._outdated - 1)
 
-    def questions(self, now_s: float, *, lacking: bool) -> list[Ask]:
-        """The question that is due, if any.
+    def questions(self, now_s: float, *, lacking: bool, present: Collection[str] = ()) -> list[Ask]:
+        """The question that is due, if any; of many who are ``present`` it is for some.
 
         Like a doubt, what is ``lacking`` and only others can tell is asked for again and again.
         """
@@ -302,7 +312,10 @@ class StateQueries:
         self._open += 1
         if lacking or not self.current:
             self._again_at_s = now_s + self._ask_s
-        return [Ask()]
+        asked = () if self._everyone else some_of(self._own, present, self._wanted, self._turn)
+        self._everyone, self._turn = False, self._turn + 1
+        self._wanted.clear()
+        return [Ask(asked)]
 
     def next_deadline_s(self) -> float | None:
         """When `questions` will next have one."""

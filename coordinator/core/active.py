@@ -347,7 +347,8 @@ class CoordinatorCore:
 
     def _conclude(self, now_s: float) -> list[CoordinatorAction]:
         """The actions of this step, with what is to ask and to keep."""
-        if not self._mission.is_over and self._state_query.due(now_s):
+        present = len(self._membership.present)
+        if not self._mission.is_over and self._state_query.due(now_s, present):
             self._actions.append(Ask())
         epoch = self.replica.epoch
         words = self.replica

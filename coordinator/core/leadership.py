@@ -20,6 +20,7 @@ from swarm.protocol.messages import Message, MissionPhase, PlanEpoch, Snapshot
 from swarm.protocol.operator_commands import abort_command
 from swarm.protocol.registers import Replica, snapshot_without, without_signers
 from swarm.protocol.sync import QuestionTimer
+from swarm.protocol.timing import stretch_of
 
 
 class LeadershipStage(IntEnum):
@@ -94,8 +95,9 @@ class StateQuery:
             self.unsure, self._outdated = True, self._open
         self._asking.want(now_s)
 
-    def due(self, now_s: float) -> bool:
-        """Whether to ask now; True once for each question."""
+    def due(self, now_s: float, present: int = 0) -> bool:
+        """Whether to ask now, with so many ``present`` who all answer; True for each question."""
+        self._asking.stretch = stretch_of(present)
         if self._again_at_s <= now_s:
             self._asking.want(now_s)
         due = self._asking.due(now_s)

@@ -232,7 +232,8 @@ class StandbyCore:
 
     def _conclude(self, now_s: float) -> list[CoordinatorAction]:
         if self.coordinator is None:
-            if not self._finished and self._state_query.due(now_s):
+            present = len(self._membership.present)
+            if not self._finished and self._state_query.due(now_s, present):
                 self._actions.append(Ask())
             self._stall_detector.expect_by(self.next_deadline_s())
         actions, self._actions = self._actions, []

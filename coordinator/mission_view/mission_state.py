@@ -53,7 +53,7 @@ from swarm.protocol.messages import (
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.sync import QuestionTimer
-from swarm.protocol.timing import StallDetector, Timing, earliest
+from swarm.protocol.timing import StallDetector, Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import AttemptResult, Choice, Claim, ClaimPhase, Outcome, Status
 
 if TYPE_CHECKING:
@@ -461,6 +461,7 @@ class MissionState:
         return True
 
     def _ask(self, now_s: float) -> list[CommonAction]:
+        self._asking.stretch = stretch_of(len(self._membership.present))
         if not self._asking.due(now_s):
             return []
         self._ask_at_s = now_s + self._timing.ask_s

@@ -118,6 +118,7 @@ class Process:
         owner: carries out what the core wants.
         clock: the machine's.
         snapshot: answers a question; None for a process that answers none.
+        whole: answers one who wants all that is known; by default as ``snapshot``.
         telemetry: where the vehicle is, if there is one; told to the core before what it hears.
         telemetry_gap_s: shortest interval at which it is told [s].
     """
@@ -132,6 +133,7 @@ class Process:
         *,
         clock: LocalClock,
         snapshot: Callable[[float], Snapshot] | None = None,
+        whole: Callable[[float], Snapshot] | None = None,
         telemetry: Callable[[], Telemetry | None] | None = None,
         telemetry_gap_s: float = 0.0,
     ) -> None:
@@ -148,6 +150,7 @@ class Process:
         self._owner = owner
         self._clock = clock
         self._snapshot = snapshot
+        self._whole = whole or snapshot
         self._telemetry = telemetry
         self._telemetry_gap_s = telemetry_gap_s
         self._told_s = -math.inf
@@ -176,11 +179,12 @@ class Process:
             self._tell_telemetry(self._telemetry)
         self._act(lambda now_s: self.core.step(event, now_s))
 
-    def answer(self) -> Snapshot | None:
-        """What it answers when asked; None when it cannot."""
-        if self.over or self.held or self._snapshot is None:
+    def answer(self, *, whole: bool = False) -> Snapshot | None:
+        """What it answers when asked, if need be for all it knows; None when it cannot."""
+        snapshot = self._whole if whole else self._snapshot
+        if self.over or self.held or snapshot is None:
             return None
-        return self._snapshot(self.now_s())
+        return snapshot(self.now_s())
 
     def resume(self) -> None:
         """Go on, with what has arrived meanwhile: first of all a deadline, if one has passed."""

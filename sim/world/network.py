@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
@@ -38,8 +38,8 @@ class Node(Protocol):
         """Something has arrived; nothing happens any more at the seat of one that ended."""
         ...
 
-    def answer(self) -> Snapshot | None:
-        """What it answers when asked; None when it cannot."""
+    def answer(self, *, whole: bool = False) -> Snapshot | None:
+        """What it answers when asked, if need be for all it knows; None when it cannot."""
         ...
 
 
@@ -62,8 +62,11 @@ class Network(Protocol):
         """``sender`` says ``message``."""
         ...
 
-    def ask(self, asker: Node) -> None:
-        """``asker`` asks all others; ends in its `SnapshotsReceived`."""
+    def ask(self, asker: Node, of: Collection[str] = ()) -> None:
+        """``asker`` asks all others, or those ``of`` whom it is for all they know.
+
+        It ends in its `SnapshotsReceived`.
+        """
         ...
 
 
@@ -100,11 +103,12 @@ class IdealNetwork:
         for_onlookers = isinstance(message.body, Status | Choice)
         self._tell_all(MessageReceived(message), sender, onlookers_only=for_onlookers)
 
-    def ask(self, asker: Node) -> None:
-        """All answer at one instant."""
+    def ask(self, asker: Node, of: Collection[str] = ()) -> None:
+        """All who are asked answer at one instant."""
 
         def answer() -> None:
-            answers = [seat.answer() for seat in self._seats if seat is not asker]
+            asked = [seat for seat in self._seats if seat is not asker]
+            answers = [seat.answer(whole=bool(of)) for seat in asked if not of or seat.writer in of]
             learned = SnapshotsReceived(tuple(a for a in answers if a is not None))
             self._later(lambda: asker.receive(learned))
 
@@ -167,6 +171,7 @@ class RouterNode:
     def receive(self, fact: CommonEvent) -> None:
         """Routers take no part."""
 
-    def answer(self) -> Snapshot | None:
+    def answer(self, *, whole: bool = False) -> Snapshot | None:
         """Routers know nothing."""
+        del whole
         return None

@@ -44,6 +44,8 @@ class _DirectedLink:
 class _PendingQuestion:
     asker: Node
     missing: set[Node]
+    whole: bool = False
+    """Whether all that is known is asked for."""
     answers: list[tuple[float, Snapshot]] = field(default_factory=list)
     """When each arrived."""
     over: bool = False
@@ -118,14 +120,17 @@ class RoughNetwork:
             if seat is not sender and not (for_onlookers and seat.writer is not None):
                 self._send(sender, seat, fact)
 
-    def ask(self, asker: Node) -> None:
-        """Ask all that can be reached; the answers end when all are in, or at the timeout."""
+    def ask(self, asker: Node, of: Collection[str] = ()) -> None:
+        """Ask who can be reached; the answers end when all are in, or at the timeout."""
         asked = [
             seat
             for seat in self._seats
-            if seat.writer is not None and seat is not asker and (asker, seat) in self._open
+            if seat.writer is not None
+            and seat is not asker
+            and (asker, seat) in self._open
+            and (not of or seat.writer in of)
         ]
-        question = _PendingQuestion(asker, set(asked))
+        question = _PendingQuestion(asker, set(asked), whole=bool(of))
         for seat in asked:
             self._pass_on(question, seat)
         if not asked:
@@ -272,7 +277,8 @@ class RoughNetwork:
 
     def _pass_on(self, question: _PendingQuestion, seat: Node) -> None:
         def reach() -> None:
-            answer = self._answer_of(seat) if self.joined(question.asker, seat) else None
+            heard = self.joined(question.asker, seat)
+            answer = self._answer_of(seat, whole=question.whole) if heard else None
             if answer is not None and not self._is_lost(back):
                 self._queue.after(self._delay_s(back), lambda: self._take(question, seat, answer))
 
@@ -280,9 +286,9 @@ class RoughNetwork:
         if not self._is_lost(there):
             self._queue.after(self._delay_s(there), reach)
 
-    def _answer_of(self, seat: Node) -> Snapshot | None:
+    def _answer_of(self, seat: Node, *, whole: bool) -> Snapshot | None:
         """What ``seat`` answers, as it is understood."""
-        return seat.answer()
+        return seat.answer(whole=whole)
 
     def _is_lost(self, link: _DirectedLink) -> bool:
         """Whether a question or an answer is."""

@@ -272,8 +272,8 @@ class World:
                 self._publish(process, make())
             case OrderVehicle(order):
                 self._order(process, order)
-            case Ask():
-                self.network.ask(process)
+            case Ask(of):
+                self.network.ask(process, of)
             case MakePlan(request, mission, method, seed):
                 plan = self._make_plan(mission, method, seed)
                 if self.mission_state.plan is None or self.zero_s is None:
@@ -409,6 +409,7 @@ class World:
             name,
             agent,
             snapshot=agent.snapshot,
+            whole=agent.whole,
             telemetry=partial(self._telemetry, name),
             telemetry_gap_s=self._setting.telemetry_gap_s,
         )

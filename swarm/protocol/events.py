@@ -96,7 +96,11 @@ class PublishLast:
 
 @dataclass(frozen=True, slots=True)
 class Ask:
-    """Ask everyone for the registers they answer for; ends in `SnapshotsReceived`."""
+    """Ask for registers; ends in `SnapshotsReceived`."""
+
+    of: tuple[str, ...] = ()
+    """Writers that are asked for whatever they know. Without any everyone is asked, for what each
+    answers for."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,8 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping
+from bisect import bisect
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import reduce
 from itertools import islice
@@ -18,16 +19,40 @@ from typing import Any, Final
 
 import msgpack
 
+from swarm.model.ids import COORDINATOR
 from swarm.protocol.encoding import encode
 from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.messages import Message
 from swarm.protocol.seal import QUESTION, Seal, UnacceptableError
+
+EVERYONE_UP_TO: Final = 16
+"""Of a larger fleet only some are asked, where all that they know is enough."""
+SOME: Final = 6
+"""So many in turn, and as many that are wanted in particular."""
+
+
+def some_of(
+    own: str, present: Collection[str], wanted: Collection[str] = (), turn: int = 0
+) -> tuple[str, ...]:
+    """Whom ``own`` asks for all they know; nobody where everyone is to be asked.
+
+    The coordinator, ``wanted`` ones, others by turns, and whoever else has the own name.
+    """
+    others = sorted(set(present) - {own, COORDINATOR})
+    if len(others) < EVERYONE_UP_TO:
+        return ()
+    begin = bisect(others, own) + turn * SOME
+    asked = [own, COORDINATOR, *[name for name in others if name in wanted][:SOME]]
+    asked += [others[(begin + place) % len(others)] for place in range(SOME)]
+    return tuple(dict.fromkeys(asked))
 
 
 class QuestionTimer:
     """Gathers wishes to ask into questions at least ``gap_s`` apart [s]."""
 
     def __init__(self, gap_s: float) -> None:
+        self.stretch = 1.0
+        """By what that interval grows, where everyone answers and there are many."""
         self._gap_s = gap_s
         self._free_at_s = -math.inf
         self._ask_at_s: float | None = None
@@ -42,7 +67,7 @@ class QuestionTimer:
         if self._ask_at_s is None or now_s < self._ask_at_s:
             return False
         self._ask_at_s = None
-        self._free_at_s = now_s + self._gap_s
+        self._free_at_s = now_s + self.stretch * self._gap_s
         return True
 
     def next_deadline_s(self) -> float | None:
@@ -96,6 +121,9 @@ def decode_digest(data: bytes) -> dict[str, int] | None:
 
 
 NONCE_BYTES: Final = 16
+_ALL_THAT_IS_KNOWN: Final = ""
+"""In a digest the name of nobody: whoever is asked so tells all it knows, not only what it answers
+for. Releases that do not know that answer as ever."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,6 +135,8 @@ class Question:
     asker: str | None
     """Who has signed it; None on a bus without keys."""
     nonce: bytes
+    whole: bool = False
+    """Whether whatever is known is wanted, not only what who is asked answers for."""
 
     @property
     def bond(self) -> bytes:
@@ -119,9 +149,11 @@ def bond(asker: str | None, nonce: bytes) -> bytes:
     return nonce + (asker or "").encode()
 
 
-def encode_question(known: Mapping[str, int], nonce: bytes, seal: Seal | None) -> bytes:
+def encode_question(
+    known: Mapping[str, int], nonce: bytes, seal: Seal | None, *, whole: bool = False
+) -> bytes:
     """The bytes of a question; its nonce counts only where there are keys."""
-    digest = encode_digest(known)
+    digest = encode_digest({_ALL_THAT_IS_KNOWN: 1, **known} if whole else known)
     return digest if seal is None else seal.wrap(nonce + digest, QUESTION)
 
 
@@ -139,4 +171,5 @@ def decode_question(data: bytes, seal: Seal | None) -> Question:
     known = decode_digest(data)
     if known is None or (seal is not None and len(nonce) < NONCE_BYTES):
         raise UnacceptableError("malformed")
-    return Question(known, asker, nonce)
+    whole = known.pop(_ALL_THAT_IS_KNOWN, 0) == 1
+    return Question(known, asker, nonce, whole)

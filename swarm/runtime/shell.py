@@ -86,6 +86,7 @@ class Shell(Generic[E, A]):
         from_bus: makes the core's event of a fact from the bus.
         execute: carries out an action that is not common to all processes.
         snapshot: answers a query; None for a process that answers none.
+        whole: answers one who wants all that is known; by default as ``snapshot``.
         known: digest of the registers the core knows; answers to it leave those out, and
             its own answers what the asker knows.
         register: of what the core knows, the statement on a key; None where there is none.
@@ -107,6 +108,7 @@ class Shell(Generic[E, A]):
         from_bus: Callable[[CommonEvent], E],
         execute: Callable[[A], None],
         snapshot: Callable[[float], Snapshot] | None,
+        whole: Callable[[float], Snapshot] | None = None,
         known: Callable[[], Mapping[str, int]] = dict,
         register: Callable[[str], Message | None] = lambda _: None,
         left_out: Callable[[], int] = int,
@@ -132,6 +134,7 @@ class Shell(Generic[E, A]):
             mission=mission,
             name=name,
             snapshot=snapshot,
+            whole=whole,
             known=known,
             answer_s=answer_s,
             draw_nonce=draw_nonce,
@@ -256,8 +259,8 @@ class Shell(Generic[E, A]):
                 self._publish(message)
             case PublishLast(make):
                 self._publish(make())
-            case Ask():
-                task = self._loop.create_task(self._ask())
+            case Ask(of):
+                task = self._loop.create_task(self._ask(of))
                 self._asking.add(task)
                 task.add_done_callback(self._asking.discard)
                 task.add_done_callback(self._fail)
@@ -357,9 +360,9 @@ class Shell(Generic[E, A]):
                 self._briefed = stamp
                 self._admission.fleet = frozenset(uav.id for uav in body.uavs)
 
-    async def _ask(self) -> None:
+    async def _ask(self, of: Sequence[str]) -> None:
         heed = partial(self._heed, answers=True)
-        learned = await self._questions.ask(heed)
+        learned = await self._questions.ask(heed, of)
         self._expect(message for snapshot in learned for message in snapshot.messages)
         self.step(self._from_bus(SnapshotsReceived(learned)))
 

@@ -13,7 +13,7 @@ from dataclasses import replace
 from typing import Final
 
 from swarm.bus.admission import QuestionFilter
-from swarm.bus.port import Bus
+from swarm.bus.port import Answer, Bus
 from swarm.protocol.codec import Codec
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, Snapshot
@@ -51,6 +51,7 @@ class StateExchange:
         mission: str,
         name: str,
         snapshot: Callable[[float], Snapshot] | None,
+        whole: Callable[[float], Snapshot] | None,
         known: Callable[[], Mapping[str, int]],
         answer_s: float,
         draw_nonce: Callable[[], bytes] = draw_nonce,
@@ -59,9 +60,10 @@ class StateExchange:
         self._seal = bus.seal
         self._clock = clock
         self._codec = codec
-        self._everyone = KeySpace(mission).state("*")
+        self._keys = KeySpace(mission)
         self._name = name
         self._snapshot = snapshot
+        self._whole = whole or snapshot
         self._known = known
         self._answer_s = answer_s
         self._draw_nonce = draw_nonce
@@ -71,7 +73,7 @@ class StateExchange:
 
     def answer(self, reply: Callable[[bytes], None], payload: bytes) -> None:
         """Answer the question ``payload``, if it is one that has an answer here."""
-        if self._snapshot is None:
+        if self._snapshot is None or self._whole is None:
             return
         try:
             question = decode_question(payload, self._seal)
@@ -82,15 +84,18 @@ class StateExchange:
         if reason is not None:
             self._codec.dropped[reason] += 1
             return
-        whole = self._snapshot(self._clock.now_s())
-        news = replace(whole, messages=unknown(whole.messages, self._known(), question.known))
+        told = (self._whole if question.whole else self._snapshot)(self._clock.now_s())
+        news = replace(told, messages=unknown(told.messages, self._known(), question.known))
         answer, left_out = self._codec.pack_answer(news, question.bond)
         if left_out:
             self._log.warning("an answer has no room for all registers", left_out=left_out)
         reply(answer)
 
-    async def ask(self, heed: Callable[[Iterable[Message]], None]) -> tuple[Snapshot, ...]:
-        """What the others know besides; their mission times brought to now.
+    async def ask(
+        self, heed: Callable[[Iterable[Message]], None], of: Sequence[str] = ()
+    ) -> tuple[Snapshot, ...]:
+        """What the others know besides, or those ``of`` whom it is asked; their mission times
+        brought to now.
 
         ``heed`` is told each answer's rosters first: by the newest of them all else is believed.
         """
@@ -98,9 +103,9 @@ class StateExchange:
         # What is said in the own name is always told: by who remembers an earlier life, or a twin.
         known = {writer: number for writer, number in self._known().items() if writer != self._name}
         nonce = self._draw_nonce()
-        question = encode_question(known, nonce, self._seal)
+        question = encode_question(known, nonce, self._seal, whole=bool(of))
         expected = bond(None if self._seal is None else self._seal.name, nonce)
-        answers = await self._bus.query(self._everyone, question, timeout_s=self._answer_s)
+        answers = await self._answers_of(of or ("*",), question)
         opened = []
         for answer in answers:
             parts = self._codec.open_answer(answer.key, answer.payload, expected)
@@ -119,6 +124,15 @@ class StateExchange:
         now_s, wall_s = self._clock.now_s(), self._loop.time()
         pace = (now_s - asked_s) / max(wall_s - asked_wall_s, 1e-9)
         return tuple(_aged(told, pace * (wall_s - at_s)) for told, at_s in read)
+
+    async def _answers_of(self, writers: Iterable[str], question: bytes) -> list[Answer]:
+        """All answers to ``question``, in order of arrival."""
+        asked = (
+            self._bus.query(self._keys.state(writer), question, timeout_s=self._answer_s)
+            for writer in writers
+        )
+        answers = [answer for each in await asyncio.gather(*asked) for answer in each]
+        return sorted(answers, key=lambda answer: answer.arrived_s)
 
     def _rosters_in(self, registers: Sequence[object]) -> tuple[list[Message], Sequence[object]]:
         """Rosters, which alone need no envelope where there are keys, and all that is left."""

@@ -89,8 +89,8 @@ class SealedNetwork(RoughNetwork):
         self._codecs.pop(writer, None)
         self.revoke(signed_roster)
 
-    def _answer_of(self, seat: Node) -> Snapshot | None:
-        answer = seat.answer()
+    def _answer_of(self, seat: Node, *, whole: bool) -> Snapshot | None:
+        answer = seat.answer(whole=whole)
         if answer is None:
             return None
         self._questions += 1

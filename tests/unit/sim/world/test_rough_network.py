@@ -43,7 +43,7 @@ class Listener:
     def receive(self, fact: CommonEvent) -> None:
         self.told.append((self.queue.now_s(), fact))
 
-    def answer(self) -> Snapshot | None:
+    def answer(self, *, whole: bool = False) -> Snapshot | None:
         name = self.writer or ""
         return Snapshot("m", name, 1, 10.0, ()) if self.answers else None
 
