@@ -40,6 +40,7 @@ from sim.bench.robustness_commands import (
     secure,
 )
 from sim.bench.route_commands import routes
+from sim.bench.scale_commands import scale
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 from swarm.runtime.options import JsonOption, SeedOption
 from swarm.scenario.files import resolve_scenario
@@ -227,6 +228,7 @@ bench.command("autopilot", short_help="Measure simulated vehicles.")(autopilot)
 bench.command("secure", short_help="Measure what keys and encryption cost.")(secure)
 bench.command("turnaround", short_help="Time from each arrival to the next target.")(turnaround)
 bench.command("legs", short_help="Time of legs flown, beyond length / speed.")(legs)
+bench.command("scale", short_help="Measure what each UAV more costs.")(scale)
 
 
 def _in_field(scenario: Path | None, *, scaling: bool) -> bool:

@@ -12,7 +12,7 @@ import math
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, TypedDict, Unpack
+from typing import Any, Protocol, TypedDict, Unpack
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import MissionResult, ProtectionSummary
@@ -30,10 +30,7 @@ from swarm.protocol.events import CommonAction, CommonEvent
 from swarm.protocol.messages import MissionPhase
 from swarm.protocol.timing import preset
 from swarm.runtime.clock import ScaledClock
-from swarm.runtime.shell import Shell, join_mission
-
-if TYPE_CHECKING:
-    from coordinator.recording.flight_recorder import FlightRecorder
+from swarm.runtime.shell import Core, Shell, join_mission
 
 FRAME_S = 0.2
 """Wall time between two pictures."""
@@ -50,6 +47,18 @@ OnFrame = Callable[[MissionState, float], None]
 """Called with what the observer knows, and its time."""
 
 
+class RunRecorder(Protocol):
+    """Takes down what the observer hears, and what the processes log."""
+
+    def around(
+        self, core: Core[CommonEvent, CommonAction], mission_state: MissionState
+    ) -> Core[CommonEvent, CommonAction]:
+        """``core``, with all it hears written down."""
+
+    def log(self, name: str, line: str, now_s: float) -> None:
+        """Write down a line that the process ``name`` has logged."""
+
+
 class RunHooks(TypedDict, total=False):
     """Who takes part in a run besides its processes."""
 
@@ -61,7 +70,7 @@ class RunHooks(TypedDict, total=False):
     """See `Launcher`."""
     observers: Sequence[str]
     """See `Launcher`."""
-    recorder: FlightRecorder | None
+    recorder: RunRecorder | None
     """Writes down what the observer hears; closed by whoever made it."""
 
 

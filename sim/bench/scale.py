@@ -1,0 +1,354 @@
+"""`swarm bench scale`: what each UAV more costs a machine, in fleets of real processes.
+
+The same kind of survey is flown by fleets of several sizes, one after the other, at wall speed and
+with the same rate of position reports, each watched for a while in the middle of its mission and
+ended. What processes use is read from the kernel: processor time, and memory as the proportional
+share of pages, since a fleet's processes share what they have imported. What is said is counted by
+an observer on the bus, decisions are timed by the agents themselves. Linux alone tells all of it.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from typing import Any
+
+from rich.console import RenderableType
+
+from coordinator.mission_view.mission_state import MissionState
+from coordinator.recording.recorder import RecordedCore
+from coordinator.recording.records import RecordableFact
+from sim.bench.fleets import options_for, survey_mission
+from sim.bench.machine import cpu_s, share_bytes, this_machine
+from sim.bench.results import BenchResult, Progress, quantile, unheard
+from sim.bench.turnaround import told_turnarounds
+from sim.fleet.child_process import ChildProcess
+from sim.fleet.layout import BusKind
+from sim.fleet.run import Run, open_run
+from swarm.model.ids import COORDINATOR
+from swarm.protocol.encoding import NAMES
+from swarm.protocol.events import CommonAction, CommonEvent, MessageReceived
+from swarm.protocol.messages import MissionPhase
+from swarm.protocol.timing import LinkKind
+from swarm.protocol.uav_messages import Choice, Status
+from swarm.runtime.clock import SystemClock
+from swarm.runtime.log import LogFormat
+from swarm.runtime.shell import Core
+from swarm.runtime.table import Column, ResultTable
+
+POSITION_RATE_HZ = 5.0
+"""Of every vehicle's reports, in every fleet."""
+AGENTS, AUTOPILOTS, ROUTERS, LAUNCHER = "agents", "autopilots", "routers", "launcher"
+START_TARGET_S, SHARE_TARGET_BYTES, LATENCY_TARGET_MS = 60.0, 40e6, 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class ScaleSettings:
+    """What is flown, and how long it is watched."""
+
+    sizes: tuple[int, ...] = (10, 50, 100, 200)
+    """UAVs of each fleet."""
+    tasks_per_uav: int = 6
+    watch_s: float = 30.0
+    """Wall time of a mission over which is counted."""
+    start_limit_s: float = 300.0
+    """Wall time after which a fleet that is not in the air is given up."""
+    method: str = "greedy"
+    link: LinkKind = LinkKind.NORMAL
+    routers: int = 1
+    seed: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class ScaleRun:
+    """One fleet."""
+
+    uavs: int
+    tasks: int
+    up_s: float | None
+    """Wall time from the first process until every agent has told its status; None: never."""
+    airborne_s: float | None
+    """Until the mission ran, with every vehicle at its start in the air."""
+    watched_s: float
+    cpu_frac: Mapping[str, float]
+    """By kind of process, processors in use while it was watched."""
+    agent_share_bytes: tuple[int, ...]
+    """Proportional share of memory of every agent."""
+    published_hz: Mapping[str, float]
+    """By kind, messages of each UAV."""
+    received_hz: Mapping[str, float]
+    """By kind, messages that each agent hears."""
+    latency_ms: tuple[float, ...]
+    """From each arrival, or end of service, until the next target was sent."""
+    lost: int
+    """UAVs that the observer took for lost, though no process had ended."""
+    ended: int
+    """Agents that ended before they were told to."""
+    load: float
+    """Processes that wanted to run during the last minute of it."""
+
+    @property
+    def agent_cpu_frac(self) -> float:
+        """Of each agent, a share of one processor."""
+        return self.cpu_frac[AGENTS] / self.uavs
+
+    @property
+    def agent_share_mean_bytes(self) -> float:
+        """Mean of all agents."""
+        return sum(self.agent_share_bytes) / max(1, len(self.agent_share_bytes))
+
+    @property
+    def said_hz(self) -> float:
+        """All that a UAV publishes."""
+        return sum(self.published_hz.values())
+
+    @property
+    def heard_hz(self) -> float:
+        """All that an agent hears but answers."""
+        return sum(self.received_hz.values())
+
+    def latency_quantile_ms(self, share: float) -> float | None:
+        """The smallest time that is not exceeded in that share of all decisions."""
+        return quantile(self.latency_ms, share)
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything, with what follows from it."""
+        derived = ("agent_cpu_frac", "agent_share_mean_bytes", "said_hz", "heard_hz")
+        return {
+            **asdict(self),
+            **{name: getattr(self, name) for name in derived},
+            "latency_p50_ms": self.latency_quantile_ms(0.5),
+            "latency_p99_ms": self.latency_quantile_ms(0.99),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class ScaleBench(BenchResult):
+    """Fleets of several sizes, the first the measure of the others."""
+
+    settings: ScaleSettings
+    runs: tuple[ScaleRun, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Everything, ready for `json.dumps`."""
+        return {
+            "machine": asdict(self.machine),
+            "settings": asdict(self.settings),
+            "runs": [run.as_json() for run in self.runs],
+        }
+
+    def tables(self) -> Iterator[ResultTable]:
+        """What people read, also in a document."""
+        yield ResultTable(
+            (
+                Column("UAVs", key="uavs"),
+                Column("up", ".1f", "s", none="never"),
+                Column("airborne", ".1f", "s", none="never"),
+                Column("memory per agent", ".1f", "MB", 1e-6),
+                Column("most", ".1f", "MB", 1e-6),
+                Column("agent's CPU", ".2f", "%", 100.0),
+                Column("all CPU", ".0f", "%", 100.0),
+                Column("p50", ".1f", "ms"),
+                Column("p99", ".1f", "ms"),
+                Column("decisions"),
+                Column("lost"),
+                Column("load", ".1f"),
+            ),
+            [
+                (
+                    run.uavs,
+                    run.up_s,
+                    run.airborne_s,
+                    run.agent_share_mean_bytes,
+                    max(run.agent_share_bytes, default=0),
+                    run.agent_cpu_frac,
+                    sum(run.cpu_frac.values()),
+                    run.latency_quantile_ms(0.5),
+                    run.latency_quantile_ms(0.99),
+                    len(run.latency_ms),
+                    run.lost + run.ended,
+                    run.load,
+                )
+                for run in self.runs
+            ],
+            "What fleets take",
+        )
+        yield self._messages("Published by each UAV [1/s]", [run.published_hz for run in self.runs])
+        yield self._messages("Heard by each agent [1/s]", [run.received_hz for run in self.runs])
+
+    def _messages(self, title: str, of: Sequence[Mapping[str, float]]) -> ResultTable:
+        """By kind, side by side, and the sum over that of the first fleet."""
+        kinds = sorted({kind for each in of for kind in each})
+        sums = [sum(each.values()) for each in of]
+        rows = [
+            (run.uavs, *(each.get(kind, 0.0) for kind in kinds), total, total / sums[0])
+            for run, each, total in zip(self.runs, of, sums, strict=True)
+            if sums[0] > 0.0
+        ]
+        columns = [Column("UAVs"), *(Column(kind, ".2f") for kind in kinds)]
+        return ResultTable((*columns, Column("all", ".2f"), Column("ratio", ".2f")), rows, title)
+
+    def parts(self) -> Iterable[RenderableType]:
+        """See `BenchResult`."""
+        settings = self.settings
+        yield (
+            f"survey of {settings.tasks_per_uav} tasks for each UAV, {settings.method}, "
+            f"{settings.routers} router(s), {POSITION_RATE_HZ:g} position reports a second, watched "
+            f"for {settings.watch_s:g} s; seed {settings.seed}"
+        )
+        for table in self.tables():
+            yield from ("", table)
+        yield ""
+        yield (
+            f"wanted: up within {START_TARGET_S:g} s, {SHARE_TARGET_BYTES / 1e6:g} MB an agent, "
+            f"p99 below {LATENCY_TARGET_MS:g} ms, ratios of what is published 1"
+        )
+
+    def as_markdown(self) -> str:
+        """For a document."""
+        return "\n\n".join([str(self.machine), *(t.as_markdown() for t in self.tables())]) + "\n"
+
+
+class MessageCount:
+    """Counts what the observer of a run hears; see `sim.fleet.run.RunRecorder`."""
+
+    def __init__(self) -> None:
+        self.heard: Counter[tuple[bool, str]] = Counter()
+        """By whether a UAV has said so, and by kind."""
+        self.there: set[str] = set()
+        """UAVs that have told their status."""
+        self.latency_ms: list[float] = []
+
+    def around(
+        self, core: Core[CommonEvent, CommonAction], mission_state: MissionState
+    ) -> Core[CommonEvent, CommonAction]:
+        """``core``, with what it hears counted."""
+        return RecordedCore(core, self, mission_state)
+
+    def note(self, what: RecordableFact, now_s: float) -> None:
+        """Count it, if it is a message."""
+        del now_s
+        if isinstance(what, MessageReceived):
+            said = what.message
+            self.heard[said.writer != COORDINATOR, NAMES[type(said.body)]] += 1
+            if isinstance(said.body, Status):
+                self.there.add(said.writer)
+
+    def log(self, name: str, line: str, now_s: float) -> None:
+        """Take from a line of a log what it tells of decisions."""
+        del name, now_s
+        for told in told_turnarounds(line):
+            self.latency_ms += told["target_ms"]
+
+
+def measure_scale(settings: ScaleSettings, tell: Progress = unheard) -> ScaleBench:
+    """Fly all fleets, one after the other.
+
+    Raises:
+        ChildFailedError: a process did not start.
+    """
+    machine = this_machine()
+    runs = [asyncio.run(_fly(n_uav, settings, tell)) for n_uav in settings.sizes]
+    return ScaleBench(machine, settings, tuple(runs))
+
+
+async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
+    mission = survey_mission(n_uav, settings.tasks_per_uav * n_uav, settings.seed)
+    count, clock = MessageCount(), SystemClock()
+    tell(f"{n_uav} UAVs: starting")
+    begun_s = clock.now_s()
+    with options_for(
+        mission, link=settings.link, bus=BusKind.ROUTER, method=settings.method
+    ) as usual:
+        options = replace(
+            usual,
+            routers=settings.routers,
+            position_rate_hz=POSITION_RATE_HZ,
+            log_format=LogFormat.JSON,
+            start_timeout_s=settings.start_limit_s,
+        )
+        async with open_run(mission, options, recorder=count) as run:
+            left_s = settings.start_limit_s - (clock.now_s() - begun_s)
+            up = await _happens(run, lambda: len(count.there) == n_uav, left_s, "all agents")
+            up_s = clock.now_s() - begun_s if up else None
+            tell(f"{n_uav} UAVs: taking off")
+            state, left_s = run.mission_state, settings.start_limit_s - (clock.now_s() - begun_s)
+            runs = await _happens(
+                run, lambda: state.phase is MissionPhase.RUNNING, left_s, "the start"
+            )
+            airborne_s = clock.now_s() - begun_s if runs else None
+            tell(f"{n_uav} UAVs: flying")
+            heard, used, at_s = count.heard.copy(), _used_s(run), clock.now_s()
+            await asyncio.sleep(settings.watch_s if runs else 0.0)
+            watched_s = clock.now_s() - at_s
+            said = count.heard - heard
+            shares = tuple(share_bytes(agent.pid) for agent in _living(run) if _is_agent(agent))
+            cpu_frac = {
+                kind: (seconds - used[kind]) / watched_s for kind, seconds in _used_s(run).items()
+            }
+            lost, ended = len(state.lost), n_uav - len(shares)
+    return ScaleRun(
+        uavs=n_uav,
+        tasks=len(mission.tasks),
+        up_s=up_s,
+        airborne_s=airborne_s,
+        watched_s=watched_s,
+        cpu_frac=cpu_frac,
+        agent_share_bytes=shares,
+        published_hz=published_hz(said, n_uav, watched_s),
+        received_hz=received_hz(said, n_uav, watched_s),
+        latency_ms=tuple(count.latency_ms),
+        lost=lost,
+        ended=ended,
+        load=os.getloadavg()[0],
+    )
+
+
+def published_hz(
+    said: Mapping[tuple[bool, str], int], n_uav: int, watched_s: float
+) -> dict[str, float]:
+    """By kind, messages of each UAV a second."""
+    return {kind: n / n_uav / watched_s for (by_uav, kind), n in said.items() if by_uav}
+
+
+def received_hz(
+    said: Mapping[tuple[bool, str], int], n_uav: int, watched_s: float
+) -> dict[str, float]:
+    """By kind, messages that an agent hears a second: of all others, but what is for onlookers."""
+    return {
+        kind: n * (1.0 - by_uav / n_uav) / watched_s
+        for (by_uav, kind), n in said.items()
+        if kind not in _FOR_ONLOOKERS
+    }
+
+
+_FOR_ONLOOKERS = frozenset({NAMES[Status], NAMES[Choice]})
+
+
+async def _happens(run: Run, condition: Callable[[], bool], limit_s: float, what: str) -> bool:
+    """Whether it does within that time."""
+    try:
+        await run.until(condition, limit_s=max(0.0, limit_s), what=what)
+    except TimeoutError:
+        return False
+    return True
+
+
+def _living(run: Run) -> list[ChildProcess]:
+    return [child for child in run.launch.lives if child.returncode is None]
+
+
+def _is_agent(child: ChildProcess) -> bool:
+    return child.arguments[0] == "agent"
+
+
+def _used_s(run: Run) -> dict[str, float]:
+    """By kind, processor time that the living processes of a run have used so far [s]."""
+    kinds = {"agent": AGENTS, "autopilot": AUTOPILOTS, "router": ROUTERS, COORDINATOR: COORDINATOR}
+    used = dict.fromkeys(kinds.values(), 0.0)
+    for child in _living(run):
+        used[kinds[child.arguments[0]]] += cpu_s(child.pid)
+    return {**used, LAUNCHER: cpu_s(os.getpid())}

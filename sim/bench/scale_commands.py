@@ -1,0 +1,96 @@
+"""The command `swarm bench scale`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from sim.bench.command_line import (
+    LONGEST_S,
+    MarkdownOption,
+    check_files,
+    each,
+    integer,
+    progress,
+    require_proc,
+    show,
+    write_file,
+)
+from sim.options import MethodOption
+from swarm.protocol.timing import LinkKind
+from swarm.runtime.options import JsonOption, LinkOption, SeedOption
+
+
+def scale(
+    sizes: Annotated[
+        str, typer.Option("--sizes", metavar="N,…", help="UAVs of the fleets, in this order.")
+    ] = "10,50,100,200",
+    watch_s: Annotated[
+        float,
+        typer.Option(
+            "--watch-s", min=1.0, max=LONGEST_S, metavar="S", help="How long each fleet is watched."
+        ),
+    ] = 30.0,
+    start_limit_s: Annotated[
+        float,
+        typer.Option(
+            "--start-limit-s",
+            min=1.0,
+            max=LONGEST_S,
+            metavar="S",
+            help="After so long a fleet that is not in the air is given up.",
+        ),
+    ] = 300.0,
+    method: MethodOption = "greedy",
+    link: LinkOption = LinkKind.NORMAL,
+    routers: Annotated[
+        int, typer.Option("--routers", min=1, max=8, metavar="N", help="So many, linked.")
+    ] = 1,
+    seed: SeedOption = 0,
+    json: JsonOption = False,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot", metavar="FILE", help="Draw it, as .png, .svg or .pdf.", show_default=False
+        ),
+    ] = None,
+    out: MarkdownOption = None,
+) -> int:
+    """Measure what each UAV more costs this machine, in fleets of real processes.
+
+    Each fleet surveys at wall speed with simulated autopilots, is watched for a while in the
+    midst of its mission and then ended: time to start, memory and processor time of its
+    processes, messages by kind, from an arrival to the next target. Needs Linux, and a quiet
+    machine for times.
+
+    Examples:
+        swarm bench scale
+        swarm bench scale --sizes 10,50 --watch-s 10 --json
+        swarm bench scale --plot scale.svg --out scale.md
+    """
+    from sim.bench.plan_report import write_figure
+    from sim.bench.scale import ScaleSettings, measure_scale
+    from sim.bench.scale_figure import scale_figure
+
+    require_proc("scale")
+    fleet_size = integer(1, 1000, "no fleet size", "give numbers within 1..1000")
+    check_files(plot, out)
+    settings = ScaleSettings(
+        sizes=tuple(each("--sizes", sizes, fleet_size)),
+        watch_s=watch_s,
+        start_limit_s=start_limit_s,
+        method=method,
+        link=link,
+        routers=routers,
+        seed=seed,
+    )
+    with progress() as tell:
+        done = measure_scale(settings, tell)
+    if plot is not None:
+        write_file("--plot", plot, lambda path: write_figure(scale_figure(done), path))
+    if out is not None:
+        write_file("--out", out, lambda path: path.write_text(done.as_markdown(), "utf-8"))
+    show(done, json=json)
+    return 0
