@@ -317,7 +317,7 @@ def published_hz(
 def received_hz(
     said: Mapping[tuple[bool, str], int], n_uav: int, watched_s: float
 ) -> dict[str, float]:
-    """By kind, messages that an agent hears a second: of all others, but what is for onlookers."""
+    """By kind, messages that an agent hears a second: of all others, but not for onlookers."""
     return {
         kind: n * (1.0 - by_uav / n_uav) / watched_s
         for (by_uav, kind), n in said.items()

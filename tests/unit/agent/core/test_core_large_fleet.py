@@ -6,9 +6,18 @@ import pytest
 
 from agent.core.interface import Action
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.events import MessageReceived, PeerGone, PeerSeen, Publish
+from swarm.protocol.events import (
+    Ask,
+    LinkChanged,
+    LogLine,
+    MessageReceived,
+    PeerGone,
+    PeerSeen,
+    Publish,
+)
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message
+from swarm.protocol.sync import EVERYONE_UP_TO, SOME
 from swarm.protocol.timing import UNSTRETCHED_UAVS, Timing, stretch_of
 from swarm.protocol.uav_messages import Claim, Outcome, Status
 from tests.support.builders import MISSION, entry, held, uav
@@ -32,6 +41,17 @@ def repeated(actions: list[Action]) -> list[Message]:
     """Registers that were published."""
     said = [action.message for action in actions if isinstance(action, Publish)]
     return [message for message in said if isinstance(message.body, Claim | Outcome)]
+
+
+def lost(actions: list[Action]) -> list[object]:
+    """Who was told to be lost."""
+    logged = [action for action in actions if isinstance(action, LogLine)]
+    return [line.fields["writer"] for line in logged if line.text == "lost"]
+
+
+def asked(actions: list[Action]) -> list[tuple[str, ...]]:
+    """Who was asked, by question."""
+    return [action.of for action in actions if isinstance(action, Ask)]
 
 
 def keep_alive(agent: LoneAgent, until_s: float, every_s: float = 1.0) -> list[Action]:
@@ -99,12 +119,10 @@ def test_a_uav_of_a_large_fleet_may_be_silent_longer_and_the_coordinator_may_not
     began_s = agent.now_s - 200.0
 
     actions = agent.run_until(began_s + TIMING.silence_s + 1.0)
-    told = [dict(a.fields) for a in actions if getattr(a, "text", "") == "lost"]
-    assert [fields["writer"] for fields in told] == [COORDINATOR]
+    assert lost(actions) == [COORDINATOR]
 
     actions = agent.run_until(began_s + silence_s + 1.0)
-    told = [dict(a.fields) for a in actions if getattr(a, "text", "") == "lost"]
-    assert len(told) == 99
+    assert len(lost(actions)) == 99
 
 
 def test_a_word_that_is_only_repeated_keeps_its_writer_alive_and_changes_nothing_else() -> None:
@@ -121,9 +139,8 @@ def test_a_word_that_is_only_repeated_keeps_its_writer_alive_and_changes_nothing
     for _ in range(20):
         agent.run_until(agent.now_s - 200.0 + 0.45 * TIMING.silence_s)
         agent.happen(MessageReceived(said))
-    lost = [a.fields["writer"] for a in agent.log if getattr(a, "text", "") == "lost"]
-    assert "u2" in lost
-    assert "u1" not in lost
+    assert "u2" in lost(agent.log)
+    assert "u1" not in lost(agent.log)
 
 
 def test_a_repeated_word_of_one_who_was_lost_makes_its_claim_count_again() -> None:
@@ -147,3 +164,46 @@ def test_statuses_come_as_often_in_every_fleet() -> None:
         said = [a.message for a in keep_alive(agent, 20.0) if isinstance(a, Publish)]
         counts.append(sum(isinstance(message.body, Status) for message in said))
     assert len(set(counts)) == 1
+
+
+def test_when_somebody_of_many_is_lost_some_are_asked_for_all_they_know() -> None:
+    agent = fleet(100)
+    actions = agent.lose("u50", 1.0)
+
+    (first,) = asked(actions)
+    assert {"u0", COORDINATOR} < set(first)
+    assert len(first) == 2 + SOME
+    assert "u50" not in first
+
+    agent.learn()
+    (second,) = asked(agent.lose("u51", 2.0))
+    assert not set(first) & set(second) - {"u0", COORDINATOR}, "they take turns"
+
+
+def test_who_is_back_is_asked_for_sure_and_of_few_everyone_is() -> None:
+    agent = fleet(100)
+    agent.lose("u50", 1.0)
+    agent.now_s += 1.0
+    (of,) = asked(agent.see("u50"))
+    assert "u50" in of
+
+    small = fleet(EVERYONE_UP_TO)
+    assert asked(small.lose("u5", 1.0)) == [()]
+
+
+def test_after_the_own_link_was_down_everyone_is_asked_of_any_fleet() -> None:
+    agent = fleet(100)
+    agent.happen(LinkChanged(False))
+    agent.now_s += 1.0
+    assert asked(agent.happen(LinkChanged(True))) == [()]
+
+
+def test_one_who_asks_for_all_is_told_what_others_have_said_but_the_coordinators_words() -> None:
+    agent = fleet(100)
+    agent.hear("u7", held("t5", 50.0))
+
+    narrow = {m.writer for m in agent.core.snapshot(agent.now_s).messages}
+    whole = {m.writer for m in agent.core.whole(agent.now_s).messages}
+
+    assert narrow == {"u0"}
+    assert whole == {f"u{n}" for n in range(100)}
