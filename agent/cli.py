@@ -215,7 +215,7 @@ def agent(
     from agent.core.path_clearance import PATH_CLEARANCE_M
     from agent.core.verticals import Verticals
     from agent.links.mavlink_vehicle import MavlinkVehicle
-    from agent.vehicle.config import BridgeConfig
+    from agent.vehicle.config import BridgeConfig, status_rate_for
     from agent.vehicle.signing import load_signing_key
     from swarm.identity import Role
     from swarm.model import Origin
@@ -247,6 +247,7 @@ def agent(
             accept_no_failsafe=accept_no_failsafe,
             acceptance_radius_m=acceptance_radius_m,
             position_rate_hz=position_rate_hz,
+            status_rate_hz=status_rate_for(position_rate_hz),
             battery_reserve_frac=_reserve_frac(battery_reserve, brief, uav),
             raises_jerk=not keep_jerk,
             ready_by_itself=ready_by_itself,

@@ -10,7 +10,7 @@ from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import REVOKED_INCARNATION, Body, Message
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.registers import Replica
-from swarm.protocol.timing import Timing, earliest
+from swarm.protocol.timing import MOST_STATUS_STRETCH, Timing, earliest
 from swarm.protocol.uav_messages import Calibration, Claim, Outcome, Status
 
 _LONGEST_NOTE = 200
@@ -141,7 +141,8 @@ class Announcer:
         if learned and (self._announce_at_s is None or self._announce_at_s <= now_s):
             said += self.announce(now_s)
         if self._status_at_s is None or self._status_at_s <= now_s:
-            self._status_at_s = now_s + self._timing.status_s
+            stretch = min(self._stretch, MOST_STATUS_STRETCH)
+            self._status_at_s = now_s + stretch * self._timing.status_s
             said.append(self.say(status()))
         return said
 

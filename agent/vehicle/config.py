@@ -33,6 +33,15 @@ class CommandStyle(StrEnum):
     if nobody commands it any more."""
 
 
+def status_rate_for(position_rate_hz: float) -> float:
+    """Rate of the other streams beside positions at that rate: a fifth of it, within 1 to 2 Hz.
+
+    There are several of them, so they would be most of what is read of a vehicle whose positions
+    are asked for seldom.
+    """
+    return min(2.0, max(1.0, position_rate_hz / 5.0))
+
+
 @dataclass(frozen=True, slots=True)
 class BridgeConfig:
     """How the bridge treats its vehicle; every duration is in vehicle seconds.

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 import swarm
+from sim.fleet.capacity import memory_bytes, usable_cores
 
 _CPU_INFO = Path("/proc/cpuinfo")
 _STATUS = Path("/proc/self/status")
@@ -49,10 +50,8 @@ def this_machine() -> MachineInfo:
         versions["OR-Tools"] = version("ortools")
     return MachineInfo(
         cpu=processor_name(),
-        cores=len(os.sched_getaffinity(0))
-        if hasattr(os, "sched_getaffinity")
-        else os.cpu_count() or 1,
-        memory_bytes=_memory_bytes(),
+        cores=usable_cores(),
+        memory_bytes=memory_bytes(),
         system=f"{platform.system()} {platform.machine()}",
         versions=versions,
         load=os.getloadavg()[0] if hasattr(os, "getloadavg") else None,
@@ -83,7 +82,7 @@ def cpu_s(pid: int) -> float:
     return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
-def memory_bytes(pid: int) -> int:
+def held_bytes(pid: int) -> int:
     """What a process holds in RAM; Linux alone tells it."""
     pages = Path(f"/proc/{pid}/statm").read_text().split()[1]
     return int(pages) * os.sysconf("SC_PAGE_SIZE")
@@ -107,10 +106,3 @@ def processor_name() -> str:
     except OSError:
         pass
     return platform.processor() or platform.machine() or "unknown processor"
-
-
-def _memory_bytes() -> int:
-    try:
-        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
-    except (ValueError, OSError, AttributeError):
-        return 0

@@ -196,8 +196,8 @@ class ScaleBench(BenchResult):
         settings = self.settings
         yield (
             f"survey of {settings.tasks_per_uav} tasks for each UAV, {settings.method}, "
-            f"{settings.routers} router(s), {POSITION_RATE_HZ:g} position reports a second, watched "
-            f"for {settings.watch_s:g} s; seed {settings.seed}"
+            f"{settings.routers} router(s), {POSITION_RATE_HZ:g} position reports a second, "
+            f"watched for {settings.watch_s:g} s; seed {settings.seed}"
         )
         for table in self.tables():
             yield from ("", table)

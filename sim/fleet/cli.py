@@ -235,6 +235,12 @@ def run(
             help="Keep what every process logs: a file of JSON lines each, in that folder.",
         ),
     ] = None,
+    any_size: Annotated[
+        bool,
+        typer.Option(
+            "--any-size", help="Fly the fleet although this machine seems too small for it."
+        ),
+    ] = False,
     json: JsonOption = False,
     verbose: Annotated[
         bool, typer.Option("--verbose", help="Show what every process logs, instead of a picture.")
@@ -261,7 +267,12 @@ def run(
     import os
 
     from coordinator.dashboard.access import parse_serve_address
-    from sim.fleet.autopilots import RunningVehicles, check_speedup, parse_autopilots
+    from sim.fleet.autopilots import (
+        RunningVehicles,
+        SimulatedAutopilots,
+        check_speedup,
+        parse_autopilots,
+    )
     from sim.fleet.firmware import SitlFirmware
     from sim.fleet.layout import LaunchOptions, defaults_for
     from sim.fleet.passthrough import (
@@ -280,6 +291,8 @@ def run(
     uavs = [uav.id for uav in mission.uavs]
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
     check_speedup(autopilots, speedup)
+    if isinstance(autopilots, SimulatedAutopilots) and not any_size:
+        _check_size(scenario, len(uavs))
     passthrough = PassthroughOptions(
         command=parse_command_styles(command, uavs),
         forward=tuple(forward or ()),
@@ -334,6 +347,15 @@ def _fly(
 
     with protected(mission, plain, secure=secure, keys=keys) as options:
         return asyncio.run(run_until_stopped(shown.fly(options)))
+
+
+def _check_size(scenario: Path, n_uav: int) -> None:
+    """Refuse a fleet that this machine cannot fly, before anything starts."""
+    from sim.fleet.capacity import memory_bytes, too_large, usable_cores
+
+    if (reason := too_large(n_uav, usable_cores(), memory_bytes())) is not None:
+        remedy = "fly it on several machines (deploy/README.md), or all the same with --any-size"
+        raise InputError(Fault(str(scenario), "uav", reason, remedy))
 
 
 def _bus_kind(text: str) -> BusKind:

@@ -105,6 +105,11 @@ def stretch_of(n_uav: int) -> float:
     return max(1.0, n_uav / UNSTRETCHED_UAVS)
 
 
+MOST_STATUS_STRETCH: Final = 5.0
+"""Statuses are for onlookers, who would hear more of them with every UAV; but the program of each
+must show that it lives several times in every `Timing.silence_s`."""
+
+
 class LinkKind(StrEnum):
     """What kind of network the processes of a fleet reach each other by."""
 

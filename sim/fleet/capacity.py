@@ -1,0 +1,52 @@
+"""Whether a machine can fly a fleet at all, as far as that can be told before anything starts.
+
+Measured by `swarm bench scale` at wall speed and 5 position reports a second (sim/README.md).
+Leaves out: what else the machine does, which nobody knows beforehand.
+"""
+
+from __future__ import annotations
+
+import os
+from typing import Final
+
+CPU_FRAC_PER_UAV: Final = 0.02
+"""Of one processor: an agent, its simulated autopilot, and what router, coordinator and launcher
+do for it."""
+BYTES_PER_UAV: Final = 40 * 10**6
+"""Of an agent and its autopilot: what they do not share."""
+BYTES_BESIDES: Final = 500 * 10**6
+"""Of everything else of a run, shared pages included."""
+
+
+def usable_cores() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def memory_bytes() -> int:
+    """RAM of this machine; 0 when unknown."""
+    try:
+        return os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    except (ValueError, OSError, AttributeError):
+        return 0
+
+
+def too_large(n_uav: int, cores: int, memory_bytes: int) -> str | None:
+    """Why that machine cannot fly so many UAVs; None if it can, for all that is known.
+
+    Args:
+        n_uav: size of the fleet.
+        cores: processors that may be used.
+        memory_bytes: RAM; 0 when unknown.
+    """
+    by_cores = int(cores / CPU_FRAC_PER_UAV)
+    by_memory = int(max(0, memory_bytes - BYTES_BESIDES) / BYTES_PER_UAV)
+    if n_uav > by_cores:
+        has = "1 core" if cores == 1 else f"{cores} cores"
+        return f"{n_uav} UAVs, and {has} can fly about {by_cores}"
+    if memory_bytes and n_uav > by_memory:
+        gib = memory_bytes / 2**30
+        return f"{n_uav} UAVs, and {gib:.1f} GiB of memory have room for about {by_memory}"
+    return None
