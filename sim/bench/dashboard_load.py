@@ -17,7 +17,7 @@ import websockets.asyncio.client as websockets
 from rich.console import RenderableType
 
 from sim.bench.fleets import started, survey_mission
-from sim.bench.machine import cpu_s, memory_bytes, this_machine
+from sim.bench.machine import cpu_s, held_bytes, this_machine
 from sim.bench.results import BenchResult, Progress, table_of, unheard
 from sim.bench.scripted_mission import MARK, ScriptedMission
 from sim.fleet.child_process import ChildFailedError, ChildProcess
@@ -222,7 +222,7 @@ async def _follow(
         first, began_s, before_s = len(acted.marked_s), clock.now_s(), cpu_s(pid)
         await asyncio.sleep(seconds)
         passed_s, spent_s = clock.now_s() - began_s, cpu_s(pid) - before_s
-        memory = memory_bytes(pid)
+        memory = held_bytes(pid)
         for task in reading:
             if task.done():
                 task.result()

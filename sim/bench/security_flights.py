@@ -22,7 +22,7 @@ from typing import Any
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import refusals
 from sim.bench.latency import SPEAKER
-from sim.bench.machine import cpu_s, memory_bytes
+from sim.bench.machine import cpu_s, held_bytes
 from sim.bench.turnaround import told_turnarounds
 from sim.fleet.child_process import ChildProcess, ProgramEnvironment
 from sim.fleet.launcher import Launcher
@@ -63,7 +63,7 @@ class ProcessMeter:
                 self._kinds.setdefault(child.pid, kind_of(child.arguments))
         for pid in self._kinds:
             with contextlib.suppress(OSError, IndexError):  # gone meanwhile
-                used_s, held = cpu_s(pid), memory_bytes(pid)
+                used_s, held = cpu_s(pid), held_bytes(pid)
                 if held:  # a process that has ended and was not waited for holds nothing
                     self._cpu_s[pid] = used_s - self._began_s.get(pid, 0.0)
                     self._most_bytes[pid] = max(held, self._most_bytes.get(pid, 0))

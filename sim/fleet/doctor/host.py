@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
+from sim.fleet.capacity import BYTES_PER_UAV, CPU_FRAC_PER_UAV
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 
 _LONGEST_AGE_S = 20 * 365.25 * 86_400.0
@@ -22,12 +23,6 @@ _FILES_AT_ALL = 128
 
 _FILES_PER_UAV = 8
 """Pipes of its agent and autopilot in the launcher (6), and its link in a mesh."""
-
-_MEMORY_PER_UAV_BYTES = 100e6
-"""Of an agent (46 MB) and a simulated autopilot (42 MB), shares of common pages included, as
-measured with 10 UAVs on Python 3.11, and a little more."""
-
-_UAVS_PER_CPU = 50
 
 _LEAST_FREE_BYTES = 50e6
 
@@ -93,15 +88,15 @@ def check_limits(limits: ResourceLimits, uavs: int) -> list[CheckFinding]:
     else:
         findings.append(fine("open files", f"{limits.open_files} allowed, enough for {fleet}"))
     cpus = f"{limits.cpus} processor{'s'[: limits.cpus - 1]}"
-    if uavs > _UAVS_PER_CPU * limits.cpus:
+    if uavs > limits.cpus / CPU_FRAC_PER_UAV:
         remedy = "fly at a lower --speedup, or spread agents over machines"
         findings.append(warns("processors", f"{cpus} are few for {fleet}", remedy))
     else:
         findings.append(fine("processors", f"{cpus} for {fleet}"))
     if limits.memory_bytes is not None:
         free_gb = f"{limits.memory_bytes / 1e9:.1f} GB free"
-        wanted_gb = f"{_MEMORY_PER_UAV_BYTES * uavs / 1e9:.1f} GB"
-        if limits.memory_bytes < _MEMORY_PER_UAV_BYTES * uavs:
+        wanted_gb = f"{BYTES_PER_UAV * uavs / 1e9:.1f} GB"
+        if limits.memory_bytes < BYTES_PER_UAV * uavs:
             text = f"{free_gb}; {fleet} with simulated autopilots take {wanted_gb}"
             remedy = "fly fewer UAVs here, or close other programs"
             findings.append(warns("memory", text, remedy))

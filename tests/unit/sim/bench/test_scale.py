@@ -1,0 +1,121 @@
+"""What is counted in fleets of several sizes is set side by side."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections import Counter
+from dataclasses import replace
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from agent.links.mavlink_vehicle import TURNAROUNDS
+from coordinator.mission_view.mission_state import MissionState
+from sim.bench.machine import share_bytes, this_machine
+from sim.bench.plan_report import write_figure
+from sim.bench.scale import (
+    AGENTS,
+    MessageCount,
+    ScaleBench,
+    ScaleRun,
+    ScaleSettings,
+    published_hz,
+    received_hz,
+)
+from sim.bench.scale_figure import scale_figure
+from swarm.model.ids import COORDINATOR
+from swarm.protocol.events import MessageReceived, Tick
+from tests.support.builders import TIMING, choice, epoch, held, message, mission, status, task, uav
+
+SMALL = ScaleRun(
+    uavs=2,
+    tasks=6,
+    up_s=1.5,
+    airborne_s=20.0,
+    watched_s=10.0,
+    cpu_frac={AGENTS: 0.04, "routers": 0.01},
+    agent_share_bytes=(20_000_000, 30_000_000),
+    published_hz={"status": 5.0, "claim": 0.5},
+    received_hz={"claim": 0.5, "epoch": 0.5},
+    latency_ms=(1.0, 2.0, 30.0),
+    lost=0,
+    ended=0,
+    load=1.0,
+)
+LARGE = replace(
+    SMALL, uavs=200, up_s=None, airborne_s=None, latency_ms=(), received_hz={"claim": 99.5}
+)
+BENCH = ScaleBench(this_machine(), ScaleSettings((2, 200)), (SMALL, LARGE))
+
+
+def test_messages_of_uavs_and_of_the_coordinator_are_counted_apart() -> None:
+    count = MessageCount()
+    facts = [
+        message("u0", status()),
+        message("u1", status()),
+        message("u0", held("t0", 1.0)),
+        message("u0", choice("t0")),
+        message(COORDINATOR, epoch("u0", "u1")),
+    ]
+    state = MissionState(mission([uav("u0"), uav("u1")], [task("t0", 1.0)]), TIMING)
+    core = count.around(state, state)
+    core.start(0.0)
+    for number, said in enumerate(facts):
+        core.step(MessageReceived(said), float(number))
+    core.step(Tick(), 10.0)
+
+    assert count.there == {"u0", "u1"}
+    assert published_hz(count.heard, 2, 10.0) == {"status": 0.1, "claim": 0.05, "choice": 0.05}
+    heard = received_hz(count.heard, 2, 10.0)
+    assert heard == {"claim": pytest.approx(0.05), "epoch": pytest.approx(0.1)}
+
+
+def test_decisions_are_timed_by_what_agents_log() -> None:
+    count = MessageCount()
+    said = {"event": TURNAROUNDS, "target_ms": [1.5, 2.5], "in_force_ms": [], "idled": 0}
+    count.log("u0", json.dumps(said), 0.0)
+    count.log("u0", "begins", 0.0)
+
+    assert count.latency_ms == [1.5, 2.5]
+
+
+def test_what_follows_from_the_figures_is_told_with_them() -> None:
+    told = BENCH.as_json()
+    first, second = told["runs"]
+
+    assert first["agent_cpu_frac"] == pytest.approx(0.02)
+    assert first["agent_share_mean_bytes"] == 25e6
+    assert (first["said_hz"], first["heard_hz"]) == (5.5, 1.0)
+    assert (first["latency_p50_ms"], first["latency_p99_ms"]) == (2.0, 30.0)
+    assert second["latency_p99_ms"] is None
+    json.dumps(told, allow_nan=False)
+
+
+def test_people_read_ratios_to_the_first_fleet_and_what_never_came() -> None:
+    text = BENCH.as_markdown()
+
+    assert "| 200 | never | never |" in text
+    assert "| 200 | 99.50 | 0.00 | 99.50 | 99.50 |" in text
+    console = Console(width=120, record=True, file=StringIO())
+    console.print(BENCH)
+    assert "What fleets take" in console.export_text()
+
+
+def test_the_picture_is_drawn_also_where_something_never_came(tmp_path: Path) -> None:
+    write_figure(scale_figure(BENCH), tmp_path / "scale.svg")
+
+    assert (tmp_path / "scale.svg").stat().st_size > 10_000
+
+
+def test_no_message_at_all_is_no_fault() -> None:
+    silent = replace(SMALL, published_hz={}, received_hz={})
+    assert ScaleBench(this_machine(), ScaleSettings((2,)), (silent,)).as_markdown()
+    assert published_hz(Counter(), 2, 1.0) == {}
+
+
+@pytest.mark.skipif(not Path("/proc/self/smaps_rollup").exists(), reason="Linux alone tells it")
+def test_the_share_of_memory_is_that_of_a_process() -> None:
+    assert 1e6 < share_bytes(os.getpid()) < 1e11
