@@ -1,6 +1,7 @@
 #include "routes_search.hpp"
 
 #include <algorithm>
+#include <limits>
 
 namespace peckorder {
 
@@ -39,6 +40,7 @@ Search::Search(const Problem& problem, const Start& start, std::uint64_t seed, d
     : current_(problem, start),
       random_(seed),
       mean_torn_(mean_torn),
+      versions_(problem.n_uav(), 0),
       best_(problem.n_uav()),
       is_unsaved_(problem.n_uav(), 0),
       is_touched_(problem.n_uav(), 0),
@@ -55,6 +57,9 @@ void Search::load(const std::vector<Route>& routes, const std::vector<int>& uavs
     current_.set_route(uav, routes[uav]);
     best_[uav] = routes[uav];
   }
+  known_.assign(tasks_.size() * uavs.size(), Known{0.0, 0, 0});
+  for (const int uav : uavs) versions_[uav] = ++last_version_;
+  gains_.resize(tasks_.size() + 1);
   std::sort(tasks_.begin(), tasks_.end());
   best_value_ = current_.total();
 }
@@ -67,11 +72,60 @@ void Search::keep_copy(int uav) {
   value_before_ += current_.route_value(uav);
 }
 
-// One place in a hundred, independently of each other: gaps between them are drawn.
-bool Search::blinks() {
-  if (--until_blink_ > 0) return false;
-  until_blink_ = 1 + static_cast<int>(kMeanToBlink * random_.exponential());
-  return true;
+// One place in a hundred is overlooked, independently of each other: gaps between them are drawn.
+int Search::places_to_blink() {
+  return 1 + static_cast<int>(kMeanToBlink * random_.exponential());
+}
+
+Insertion Search::most_gained(int uav) const {
+  const int size = static_cast<int>(current_.route(uav).size());
+  double most = gains_[0];
+  for (int place = 1; place <= size; ++place) most = std::max(most, gains_[place]);
+  int place = 0;
+  while (place < size && gains_[place] != most) ++place;
+  return {uav, place, most};
+}
+
+// Of one list; lists that have changed in this iteration may change back.
+Insertion Search::best_place(int uav, int task) {
+  const std::size_t row = static_cast<std::size_t>(current_.row(task)) * uavs().size();
+  Known& known = known_[row + current_.column(uav)];
+  if (!is_touched_[uav] && known.version == versions_[uav]) return {uav, known.place, known.gain};
+  current_.insertion_gains(uav, task, gains_.data());
+  const Insertion best = most_gained(uav);
+  if (!is_touched_[uav]) known = {best.gain, best.place, versions_[uav]};
+  return best;
+}
+
+// `best` of its list, or the next best if that place is overlooked.
+Insertion Search::best_unblinked(const Insertion& best, int task) {
+  const int places = static_cast<int>(current_.route(best.uav).size()) + 1;
+  if (until_blink_ > places) {
+    until_blink_ -= places;
+    return best;
+  }
+  overlooked_.clear();
+  bool sees_best = true;
+  for (; until_blink_ <= places; until_blink_ += places_to_blink()) {
+    overlooked_.push_back(until_blink_ - 1);
+    sees_best = sees_best && until_blink_ - 1 != best.place;
+  }
+  until_blink_ -= places;
+  if (sees_best) return best;
+  current_.insertion_gains(best.uav, task, gains_.data());
+  for (const int place : overlooked_) gains_[place] = -std::numeric_limits<double>::infinity();
+  return most_gained(best.uav);
+}
+
+Insertion Search::best_insertion(int task, bool may_blink) {
+  Insertion best;
+  for (const int uav : uavs()) {
+    if (!current_.capable(uav, task)) continue;
+    Insertion found = best_place(uav, task);
+    if (may_blink) found = best_unblinked(found, task);
+    if (found.gain > best.gain) best = found;
+  }
+  return best;
 }
 
 void Search::ruin() {
@@ -132,8 +186,8 @@ void Search::recreate() {
   }
   std::sort(order_.begin(), order_.end());
   for (const auto& [key, task] : order_) {
-    Insertion best = best_insertion(current_, task, [this] { return blinks(); });
-    if (best.uav < 0) best = best_insertion(current_, task);
+    Insertion best = best_insertion(task, true);
+    if (best.uav < 0) best = best_insertion(task, false);
     keep_copy(best.uav);
     current_.insert(best.uav, best.place, task);
   }
@@ -155,9 +209,10 @@ void Search::run(long iterations, double temperature, Watch& watch) {
       is_touched_[uav] = 0;
       if (!accepted) {
         current_.restore(uav, copies_[k]);
-      } else if (!is_unsaved_[uav]) {
+      } else if (!current_.is_as(uav, copies_[k])) {
+        versions_[uav] = ++last_version_;
+        if (!is_unsaved_[uav]) unsaved_.push_back(uav);
         is_unsaved_[uav] = 1;
-        unsaved_.push_back(uav);
       }
     }
     touched_.clear();

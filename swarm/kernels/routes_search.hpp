@@ -3,7 +3,9 @@
 // Slack induction by string removals (Christiaens and Vanden Berghe 2020,
 // doi:10.1287/trsc.2019.0914) carried over to eq. 1: near tasks are torn out of a few lists as
 // strings and put back one by one where J gains most, now and then overlooking a place.
-// Single-threaded; sharing the work between threads is routes_team.hpp's part.
+// The best place for a task on a list is remembered until the list changes, which most lists have not
+// done when the task is torn out again. Single-threaded; sharing the work between threads is
+// routes_team.hpp's part.
 #pragma once
 
 #include <utility>
@@ -42,7 +44,11 @@ class Search : public Lane {
   void tear(int task, double longest);
   void recreate();
   void keep_copy(int uav);
-  bool blinks();
+  int places_to_blink();
+  Insertion best_insertion(int task, bool may_blink);
+  Insertion best_place(int uav, int task);
+  Insertion best_unblinked(const Insertion& best, int task);
+  Insertion most_gained(int uav) const;
 
   static constexpr double kMeanTorn = 15.0;
 
@@ -50,6 +56,17 @@ class Search : public Lane {
   Random random_;
   double mean_torn_;
   int until_blink_ = 1;  // places looked at till the next that is overlooked
+  // The best place of a list for a task, which stays so as long as the list does.
+  struct Known {
+    double gain;
+    std::int32_t place;
+    std::uint32_t version;  // of the list; versions begin with 1
+  };
+  std::vector<Known> known_;             // per task and allowed UAV
+  std::vector<std::uint32_t> versions_;  // of the lists as they were accepted, per UAV
+  std::uint32_t last_version_ = 0;
+  std::vector<double> gains_;            // at each place of the list looked at
+  std::vector<int> overlooked_;          // places of it
   double best_value_ = 0.0;
   std::vector<Route> best_;
   std::vector<int> tasks_;                     // all tasks on the lists

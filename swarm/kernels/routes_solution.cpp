@@ -194,4 +194,58 @@ double Solution::insertion_gain(int uav, int place, int task, double least) cons
   return most - survived * survival * delay_s * next->slope;
 }
 
+void Solution::insertion_gains(int uav, int task, double* gains) const {
+  const Visit* const visits = flights_[uav].visits.data();
+  const int size = static_cast<int>(routes_[uav].size());
+  const double* const here_m = problem_->place_m(task);
+  const double service_s = problem_->service_s(task), horizon_s = problem_->horizon_s();
+  const Pairing known = pairing(uav, task);
+  double survived = start_->survived[uav];
+  double completion_s = start_->free_s[uav] + known.first_way_s;
+  for (int place = 0; place < size; ++place) {
+    const Visit& next = visits[place];
+    const double travel_s = problem_->quick_travel_s(uav, here_m, next.place_m);
+    const double lost = (1.0 - known.survival) * next.worth;
+    const double most = survived * (known.weight * (horizon_s - completion_s) - lost);
+    const double delay_s = completion_s + travel_s + next.service_s - next.completion_s;
+    gains[place] = most - survived * known.survival * delay_s * next.slope;
+    survived = next.survived_after;
+    completion_s = next.completion_s + (travel_s + service_s);
+  }
+  gains[size] = survived * (known.weight * (horizon_s - completion_s));
+}
+
+Insertion best_insertion(const Solution& solution, int task) {
+  constexpr int kScanAllBelow = 150;
+  constexpr int kManyTasks = 2000, kNear = 48, kNearOfMany = 32;
+  const Problem& problem = solution.problem();
+  Insertion best;
+  const auto offer = [&](int uav, int place) {
+    const double gain = solution.insertion_gain(uav, place, task, best.gain);
+    if (gain > best.gain) best = {uav, place, gain};
+  };
+  const bool all = problem.n_task() <= kScanAllBelow;
+  if (!all) {
+    const double* here_m = problem.place_m(task);
+    const std::int32_t* near = problem.near(task);
+    const int most =
+        std::min(problem.n_task() < kManyTasks ? kNear : kNearOfMany, problem.n_near());
+    const double farthest_m = Problem::straight_m(here_m, problem.place_m(near[most - 1]));
+    for (int k = 0; k < most; ++k) {
+      const int uav = solution.uav_of(near[k]);
+      if (uav < 0 || !solution.capable(uav, task)) continue;
+      const int place = solution.place_of(near[k]);
+      offer(uav, place + 1);
+      // after a task that is as near, it is offered there
+      if (place > 0 && solution.straight_m(uav, place - 1, here_m) >= farthest_m) offer(uav, place);
+    }
+  }
+  for (const int uav : solution.allowed()) {
+    if (!solution.capable(uav, task)) continue;
+    const int size = static_cast<int>(solution.route(uav).size());
+    for (int place = 0; place <= (all ? size : 0); ++place) offer(uav, place);
+  }
+  return best;
+}
+
 }  // namespace peckorder

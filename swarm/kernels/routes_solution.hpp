@@ -110,6 +110,7 @@ class Solution {
 
   void copy(int uav, Copy& copy) const;
   void restore(int uav, Copy& copy);  // which then holds the list that was replaced
+  bool is_as(int uav, const Copy& copy) const { return routes_[uav] == copy.route; }
 
   double total() const;       // Σ over the allowed UAVs' lists
   double mean_delay() const;  // mean over tasks of S·w·(t − start): the scale of differences in J
@@ -123,6 +124,13 @@ class Solution {
   // more than `least`, that or anything less.
   double insertion_gain(int uav, int place, int task,
                         double least = -std::numeric_limits<double>::infinity()) const;
+
+  // The same at every place of the list, into gains[0..size], to the last bit.
+  void insertion_gains(int uav, int task, double* gains) const;
+
+  // Among the tasks at hand, -1 if it is not; among the allowed UAVs.
+  int row(int task) const { return row_of_[task]; }
+  int column(int uav) const { return column_of_[uav]; }
 
   // What the segment before `place` hands on: survival, and the first completion that follows.
   double survived_before(int uav, int place) const {
@@ -186,44 +194,7 @@ class Solution {
 };
 
 // The best of all places among the allowed UAVs, or, with many tasks, of those beside the task's
-// near neighbours and at the front of each list. `skip` drops a candidate where it returns true.
-template <class Skip>
-Insertion best_insertion(const Solution& solution, int task, Skip&& skip) {
-  constexpr int kScanAllBelow = 150;
-  constexpr int kManyTasks = 2000, kNear = 48, kNearOfMany = 32;
-  const Problem& problem = solution.problem();
-  Insertion best;
-  const auto offer = [&](int uav, int place) {
-    if (skip()) return;
-    const double gain = solution.insertion_gain(uav, place, task, best.gain);
-    if (gain > best.gain) best = {uav, place, gain};
-  };
-  const bool all = problem.n_task() <= kScanAllBelow;
-  if (!all) {
-    const double* here_m = problem.place_m(task);
-    const std::int32_t* near = problem.near(task);
-    const int most =
-        std::min(problem.n_task() < kManyTasks ? kNear : kNearOfMany, problem.n_near());
-    const double farthest_m = Problem::straight_m(here_m, problem.place_m(near[most - 1]));
-    for (int k = 0; k < most; ++k) {
-      const int uav = solution.uav_of(near[k]);
-      if (uav < 0 || !solution.capable(uav, task)) continue;
-      const int place = solution.place_of(near[k]);
-      offer(uav, place + 1);
-      // after a task that is as near, it is offered there
-      if (place > 0 && solution.straight_m(uav, place - 1, here_m) >= farthest_m) offer(uav, place);
-    }
-  }
-  for (const int uav : solution.allowed()) {
-    if (!solution.capable(uav, task)) continue;
-    const int size = static_cast<int>(solution.route(uav).size());
-    for (int place = 0; place <= (all ? size : 0); ++place) offer(uav, place);
-  }
-  return best;
-}
-
-inline Insertion best_insertion(const Solution& solution, int task) {
-  return best_insertion(solution, task, [] { return false; });
-}
+// near neighbours and at the front of each list.
+Insertion best_insertion(const Solution& solution, int task);
 
 }  // namespace peckorder
