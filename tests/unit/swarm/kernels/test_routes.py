@@ -11,6 +11,7 @@ from coordinator.planner.exact import optimum
 from swarm.allocation import Problem, TeamState, evaluate
 from swarm.allocation.rules import team_arrays
 from swarm.kernels.routes import TeamArrays, improve_routes, optimise_routes
+from tests.support.plain_search import plain_search
 from tests.support.problems import any_problem, paper_problem, random_problem, table_1
 from tests.support.reference import best_of_neighbourhood, team_worth
 
@@ -117,6 +118,19 @@ def test_local_search_ends_where_no_move_gains(seed: int, n_uav: int, n_task: in
     )
     best = best_of_neighbourhood(part, team, [idle[u] for u in active])
     assert best <= worth + 1e-8 * (1.0 + abs(worth))
+
+
+@pytest.mark.parametrize("survival", [0.8, 1.0])
+@pytest.mark.parametrize("seed", [1, 3])
+def test_the_search_is_that_which_values_every_place_anew(seed: int, survival: float) -> None:
+    rng = np.random.default_rng(seed)
+    problem = random_problem(rng, 4, 22, lowest_survival=survival, incapable_frac=0.2)
+    state = any_state(problem, rng)
+    state.active[:2] = True
+
+    lists, _ = optimise_routes(team_of(problem, state), seed=seed, iterations=200)
+
+    assert lists == plain_search(problem, state, seed, 200)
 
 
 def test_the_number_of_threads_does_not_change_the_result() -> None:
