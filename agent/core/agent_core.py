@@ -445,12 +445,13 @@ class AgentCore(AgentPart):
         return Status(
             phase=self.phase,
             task=None if claim is None else claim.task,
-            position_enu_m=self._mission_view.place_enu_m,
+            position_enu_m=self._mission_view.carried_enu_m,
             velocity_enu_m_s=None if telemetry is None else telemetry.velocity_enu_m_s,
             battery_frac=None if telemetry is None else telemetry.battery_frac,
             mission_s=self._mission_view.clock.mission_s(now_s),
             dropped=dict((+dropped).most_common(MOST_REASONS)),
             note=self._announcer.note,
+            layer_m=self._mission_view.told_layer_m,
         )
 
     def _note_impossible(self, state: AgentState, trigger: Trigger) -> None:

@@ -29,6 +29,9 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Outcome
 
+CARRIED_S = 1.0
+"""So long a vehicle is taken to fly on as it last told [s]; then it is where it would be by now."""
+
 
 class MissionChange(Enum):
     """What a statement changes for an agent that is free to take a task."""
@@ -48,6 +51,10 @@ class MissionView:
         """The newest of the own vehicle."""
         self.now_s = 0.0
         """Of the step that is under way, on the own clock."""
+        self._moved_s = 0.0
+        """When the vehicle last told where it is, by the same clock."""
+        self._below_m: float | None = None
+        """How much lower than the vehicle that place is [m]; None: its layer was not known."""
         self._place_enu_m: Point | None = None
         self._stands_enu_m: Point | None = None
         """Where it stands on the ground, between two flights."""
@@ -137,12 +144,38 @@ class MissionView:
         """Where the UAV is [m; mission origin], without its height layer; None if not known."""
         return self._place_enu_m if self._stands_enu_m is None else self._stands_enu_m
 
+    @property
+    def carried_enu_m(self) -> Point | None:
+        """The same at this very step: carried on by the velocity that the vehicle told last.
+
+        Vehicles tell their places a few times a second; whoever compares those of several wants
+        them at one instant. None as well before it is known in which layer the UAV flies.
+        """
+        place_enu_m, telemetry = self.place_enu_m, self.telemetry
+        if self.stands or place_enu_m is None:
+            return place_enu_m
+        if self._below_m is None or telemetry is None:
+            return None
+        since_s = min(CARRIED_S, self.now_s - self._moved_s)
+        east_m, north_m, up_m = (
+            here + since_s * speed
+            for here, speed in zip(place_enu_m, telemetry.velocity_enu_m_s, strict=True)
+        )
+        return east_m, north_m, up_m
+
+    @property
+    def told_layer_m(self) -> float | None:
+        """How much higher than that place it is [m]; None: by its layer in the brief."""
+        below_m = 0.0 if self.stands else self._below_m
+        return None if below_m == self._layer_m else below_m
+
     def move(self, telemetry: Telemetry) -> None:
         """The vehicle has told where it is."""
         east_m, north_m, up_m = telemetry.position_enu_m
-        self.telemetry = telemetry
+        self.telemetry, self._moved_s = telemetry, self.now_s
         layer_m = 0.0 if self._out_of_layer else self._layer_m
         self._place_enu_m = east_m, north_m, up_m - layer_m
+        self._below_m = None if self.me is None else layer_m
 
     def arrive(self, place_enu_m: Point, *, own_height: bool = False) -> None:
         """The vehicle has reached that place; where exactly it is follows with its next word.
@@ -152,6 +185,7 @@ class MissionView:
             own_height: the height is that of the flight there, with no layer to come on top.
         """
         self._place_enu_m, self._out_of_layer = place_enu_m, own_height
+        self._below_m = 0.0 if own_height else self._layer_m
 
     def set_off(self) -> None:
         """The vehicle flies on, to wherever."""
@@ -170,6 +204,7 @@ class MissionView:
         """The vehicle takes off from where it stands, straight up."""
         if self._stands_enu_m is not None:
             self._place_enu_m, self._stands_enu_m = self._stands_enu_m, None
+            self._below_m = 0.0
 
     def take_off(self) -> None:
         """The vehicle is in the air; one that has not told where it is hovers at its start."""

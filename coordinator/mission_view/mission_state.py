@@ -13,6 +13,7 @@ from dataclasses import replace
 from itertools import chain
 from typing import TYPE_CHECKING
 
+from coordinator.mission_view.approaches import Approach, ObservedApproaches
 from coordinator.mission_view.fleet_reports import FleetReports
 from coordinator.mission_view.flown_mission import FlownMission
 from coordinator.mission_view.narrator import MissionNarrator
@@ -38,7 +39,6 @@ from swarm.protocol.events import (
     SnapshotsReceived,
 )
 from swarm.protocol.field_messages import ZoneEdit
-from swarm.protocol.fields import Point
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import (
     REVOKED_INCARNATION,
@@ -59,6 +59,10 @@ from swarm.protocol.uav_messages import AttemptResult, Choice, Claim, ClaimPhase
 if TYPE_CHECKING:
     from coordinator.mission_view.ways import FleetWays, UavWays
 
+FEW_S = 5.0
+FEW_STATUSES = 10
+"""Of a UAV that told nothing for that long, or the time of so many statuses, nobody knows where it
+flew meanwhile [s of mission]."""
 EPOCHS_KEPT = 16
 """Epochs that an observer tells from new ones; one is restated soon after it was stated, or not."""
 
@@ -69,9 +73,17 @@ class MissionState:
     Args:
         timing: timers, in the seconds of ``now_s``.
         explains: tell of everything why, for an explanation of a recording.
+        near_m: remember every time that two UAVs came as near as this to each other [m].
     """
 
-    def __init__(self, mission: Mission, timing: Timing, *, explains: bool = False) -> None:
+    def __init__(
+        self,
+        mission: Mission,
+        timing: Timing,
+        *,
+        explains: bool = False,
+        near_m: float | None = None,
+    ) -> None:
         self.plan: Plan | None = None
         """The offline plan, once somebody who knows it has told; see `take_plan`."""
         self.replica = Replica()
@@ -83,7 +95,9 @@ class MissionState:
         self.cut_since_s: float | None = None
         """When the own link to the bus went down [s of ``now_s``]; None while it is up."""
         self._timing = timing
-        self.flights = ObservedFlights()
+        self.flights = ObservedFlights(
+            ObservedApproaches(max(FEW_S, FEW_STATUSES * timing.status_s), near_m)
+        )
         """Where UAVs went, as far as they have told."""
         self.limits = ObservedLimits()
         """How near they came to zones and to the end of their batteries, likewise."""
@@ -264,6 +278,15 @@ class MissionState:
             if states.get(task, TaskState.OPEN) is TaskState.OPEN and task not in taken
         }
 
+    @property
+    def nearest(self) -> Approach | None:
+        """The nearest that two UAVs in flight have come to each other, as far as they told."""
+        return self.flights.approaches.nearest
+
+    def nearest_now(self, now_s: float) -> Approach | None:
+        """The two in flight that are nearest to each other now."""
+        return self.flights.approaches.nearest_now(self.mission_s(now_s), now_s)
+
     def executed_schedule(self) -> Schedule:
         """Every UAV's list as it has flown it, as far as it is known."""
         return self.flights.executed_schedule(self.mission, self.board.field_problem)
@@ -316,14 +339,7 @@ class MissionState:
             reborn = self._reports.take_status(writer, message.stamp, message.body)
             if reborn is not None:
                 self._narrator.status(writer, message.body, before, now_s, reborn=reborn)
-                layer_m, grounds = self._layer_and_grounds(writer)
-                self.flights.hear_status(writer, message.body, layer_m, grounds)
-                zones = zones_in_force(self.replica)
-                brief = self.replica.brief
-                terrain = (
-                    None if brief is None or brief.terrain is None else brief.terrain.terrain()
-                )
-                self.limits.hear(writer, message.body, layer_m, zones, terrain, grounds)
+                self._follow(writer, message.body, now_s)
             return
         if isinstance(message.body, Choice):
             if self._reports.take_choice(writer, message.stamp, message.body):
@@ -353,16 +369,18 @@ class MissionState:
                 pass
         self._narrator.hear(message, earlier, claim, now_s)
 
-    def _layer_and_grounds(self, uav: str) -> tuple[float, list[Point]]:
-        """Height of a UAV's layer above where it says that it is [m], and where it may stand."""
+    def _follow(self, uav: str, status: Status, now_s: float) -> None:
+        """See where a UAV of the fleet flies."""
         brief = self.replica.brief
-        if brief is None:
-            return 0.0, []
-        bases = [base.position_enu_m for base in brief.bases]
-        for spec in brief.uavs:
-            if spec.id == uav:
-                return spec.layer_m, [spec.position_enu_m, *bases]
-        return 0.0, bases
+        fleet = () if brief is None else brief.uavs
+        spec = next((each for each in fleet if each.id == uav), None)
+        if brief is None or spec is None:
+            return
+        grounds = [spec.position_enu_m, *(base.position_enu_m for base in brief.bases)]
+        self.flights.hear_status(uav, status, spec.layer_m, grounds, now_s)
+        terrain = None if brief.terrain is None else brief.terrain.terrain()
+        zones = zones_in_force(self.replica)
+        self.limits.hear(uav, status, spec.layer_m, zones, terrain, grounds)
 
     def _is_another_visit(self, outcome: Outcome, earlier: Message) -> bool:
         """Whether it is no mere restatement, by a new life of the agent, of what was known."""

@@ -1,26 +1,23 @@
 """What an observer knows of where UAVs went: lists by their claims and outcomes, places by status.
 
 What nobody told is told of nobody: a visit is known by its outcome, the way home by the word that
-a UAV takes no further part, ways as everybody finds them (`FlownWays`), and distances by straight
-lines between the places in its status, so what UAVs do beside these lines in between is not seen.
+a UAV takes no further part, ways as everybody finds them (`FlownWays`), and how near UAVs come to
+each other by the places in their statuses (`ObservedApproaches`).
 """
 
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from coordinator.mission_view.approaches import ObservedApproaches
 from coordinator.mission_view.flown_ways import FlownWays, MapPoint
 from swarm.allocation import field as constrained
 from swarm.model import BaseId, Mission, Task, Uav, UavId
 from swarm.model.plan import START, ScheduleEntry, at_base
 from swarm.protocol.fields import Point
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, Outcome, Status, StatusPhase
-
-_KEPT = 32
-"""Places remembered of each UAV: for as long as another one's may come late."""
 
 _ON_THE_GROUND = (BaseStage.LANDED, BaseStage.PARKED)
 _NEAR_GROUND_M = 20.0
@@ -50,8 +47,8 @@ class _ObservedFlight:
     """By the time of a decision [s], where it was then."""
     departed_s: dict[tuple[str | None, float], float] = field(default_factory=dict)
     """By task, None for a base, and since when it was free for it, when it set off [s]."""
-    fixes: deque[_Fix] = field(default_factory=lambda: deque(maxlen=_KEPT))
-    """Newest places in flight."""
+    fix: _Fix | None = None
+    """When and where it was last in flight; None while it stands on the ground."""
     left_s: float | None = None
     """When it was to take no further part [s]."""
     left_at_base: bool = False
@@ -95,46 +92,44 @@ class _ObservedFlight:
 
 
 class ObservedFlights:
-    """The flights of one fleet, in mission time."""
+    """The flights of one fleet, in mission time.
 
-    def __init__(self) -> None:
-        self.closest_approach_m: float | None = None
-        """Least distance seen of two UAVs in flight [m]; None until two were."""
+    Args:
+        approaches: told who is in flight, and where.
+    """
+
+    def __init__(self, approaches: ObservedApproaches) -> None:
+        self.approaches = approaches
         self._flights: dict[str, _ObservedFlight] = {}
 
     # -- what is heard ------------------------------------------------------------------
 
     def hear_status(
-        self, uav: str, status: Status, layer_m: float, grounds: Sequence[Point] = ()
+        self, uav: str, status: Status, layer_m: float, grounds: Sequence[Point], now_s: float
     ) -> None:
-        """A UAV tells where it is, ``layer_m`` above that.
+        """A UAV tells where it is.
 
-        Where it stands at one of ``grounds``, a start or a base, it is not in flight.
+        Args:
+            uav: who.
+            status: what it tells.
+            layer_m: its layer in the brief [m].
+            grounds: starts and bases: where it stands at one it is not in flight.
+            now_s: by the observer's clock, for what is told before there is mission time [s].
         """
         flight = self._flights.setdefault(uav, _ObservedFlight())
-        if status.mission_s is None or status.position_enu_m is None:
+        mission_s, place = status.mission_s, status.flown_enu_m(layer_m)
+        is_home = status.phase is StatusPhase.HOME
+        if is_home and flight.left_s is not None and flight.home_s is None:
+            flight.home_s = mission_s
+        if place is None or is_home or any(_stands_at(place, ground) for ground in grounds):
+            flight.fix = None
+            self.approaches.land(uav)
             return
-        if status.phase is StatusPhase.HOME:
-            if flight.left_s is not None and flight.home_s is None:
-                flight.home_s = status.mission_s
-            return
-        if status.phase in (StatusPhase.LEARNING, StatusPhase.PREPARING, StatusPhase.OUT):
-            return
-        east_m, north_m, up_m = status.position_enu_m
-        if flight.fixes and flight.fixes[-1][0] >= status.mission_s:
-            return
-        place = east_m, north_m, up_m + layer_m
-        # At a base agents tell the ground that they stand on, elsewhere where they are without
-        # their layer.
-        lands = flight.claim is not None and flight.claim.stage in _ON_THE_GROUND
-        low = (place, status.position_enu_m) if lands else (place,)
-        if any(_stands_at(each, ground) for each in low for ground in grounds):
-            flight.fixes.clear()
-            return
-        flight.fixes.append((status.mission_s, place))
-        for other, rival in self._flights.items():
-            if other != uav:
-                self._compare(flight.fixes, rival.fixes)
+        at_s = now_s if mission_s is None else mission_s
+        started = mission_s is not None
+        self.approaches.fly(uav, at_s, place, status.velocity_enu_m_s, started=started)
+        if started and (flight.fix is None or flight.fix[0] < at_s):
+            flight.fix = at_s, place
 
     def hear(self, writer: str, body: object, mission_s: float | None = None) -> None:
         """Somebody says something that was not known, at that mission time where it is known."""
@@ -157,8 +152,8 @@ class ObservedFlights:
             waited = mission_s is not None and mission_s > claim.decided_s + _FRESH_S
             since_s = mission_s if waited and mission_s is not None else claim.decided_s
             flight.departed_s.setdefault((claim.task, claim.decided_s), since_s)
-        if flight.fixes and abs(flight.fixes[-1][0] - claim.decided_s) <= _FRESH_S:
-            flight.decided_m.setdefault(claim.decided_s, flight.fixes[-1][1][:2])
+        if flight.fix is not None and abs(flight.fix[0] - claim.decided_s) <= _FRESH_S:
+            flight.decided_m.setdefault(claim.decided_s, flight.fix[1][:2])
         if claim.phase is ClaimPhase.OUT and flight.left_s is None:
             flight.left_s = claim.decided_s
             flight.left_at_base = before is not None and before.stage in _ON_THE_GROUND
@@ -202,33 +197,6 @@ class ObservedFlights:
             for uav in mission.uavs
         }
 
-    def _compare(self, fixes: deque[_Fix], others: deque[_Fix]) -> None:
-        """Look how near the newest piece of a way comes to another's."""
-        if len(fixes) < 2:
-            return
-        (begin_s, begin), (end_s, end) = fixes[-2], fixes[-1]
-        for index in range(len(others) - 1, 0, -1):
-            (from_s, start), (to_s, stop) = others[index - 1], others[index]
-            first_s, last_s = max(begin_s, from_s), min(end_s, to_s)
-            if to_s < begin_s:
-                break
-            if first_s > last_s:
-                continue
-            apart = [
-                tuple(
-                    a - b
-                    for a, b in zip(
-                        _at((begin_s, begin), (end_s, end), at_s),
-                        _at((from_s, start), (to_s, stop), at_s),
-                        strict=True,
-                    )
-                )
-                for at_s in (first_s, last_s)
-            ]
-            distance_m = _least_m(apart[0], apart[1])
-            if self.closest_approach_m is None or distance_m < self.closest_approach_m:
-                self.closest_approach_m = distance_m
-
 
 def _visit(
     uav: str, task: Task, claim: Claim, here: Point, times_s: tuple[float, float], ways: FlownWays
@@ -256,20 +224,3 @@ def _visit(
 def _stands_at(place: Point, ground: Point) -> bool:
     away_m = math.hypot(place[0] - ground[0], place[1] - ground[1])
     return away_m <= _NEAR_GROUND_M and place[2] <= ground[2] + _LIFTED_M
-
-
-def _at(begin: _Fix, end: _Fix, at_s: float) -> Point:
-    (begin_s, start), (end_s, stop) = begin, end
-    share = 0.0 if end_s <= begin_s else (at_s - begin_s) / (end_s - begin_s)
-    east_m, north_m, up_m = (a + share * (b - a) for a, b in zip(start, stop, strict=True))
-    return east_m, north_m, up_m
-
-
-def _least_m(first: tuple[float, ...], last: tuple[float, ...]) -> float:
-    """Least length of an offset that changes evenly from the first to the last [m]."""
-    change = [b - a for a, b in zip(first, last, strict=True)]
-    square = sum(c * c for c in change)
-    share = 0.0
-    if square > 0.0:
-        share = min(1.0, max(0.0, -sum(a * c for a, c in zip(first, change, strict=True)) / square))
-    return math.hypot(*(a + share * c for a, c in zip(first, change, strict=True)))

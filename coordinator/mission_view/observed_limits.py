@@ -63,7 +63,7 @@ class ObservedLimits:
         Args:
             uav: who.
             status: what it tells.
-            layer_m: how much higher it is than the place that it tells.
+            layer_m: its layer in the brief [m].
             zones: those in force.
             terrain: the ground; None: nobody looks at it.
             grounds: where it takes off and lands.
@@ -73,10 +73,9 @@ class ObservedLimits:
         if status.battery_frac is not None:
             lowest = self.lowest_charge_frac.get(uav, math.inf)
             self.lowest_charge_frac[uav] = min(lowest, status.battery_frac)
-        if status.position_enu_m is None or not (zones or terrain):
+        place = status.flown_enu_m(layer_m)
+        if place is None or not (zones or terrain):
             return
-        east_m, north_m, up_m = status.position_enu_m
-        place = east_m, north_m, up_m + layer_m
         now = status.mission_s, place, status.velocity_enu_m_s
         before = self._last.get(uav, now)
         if before[0] > now[0]:

@@ -11,7 +11,15 @@ from dataclasses import dataclass, field
 from itertools import pairwise
 from types import MappingProxyType
 
-from coordinator.mission_view.wording import counted, listed, rates_in_words, shown_s
+from coordinator.mission_view.approaches import Approach
+from coordinator.mission_view.wording import (
+    approach_in_words,
+    counted,
+    listed,
+    rates_in_words,
+    shown_m,
+    shown_s,
+)
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
 from swarm.model import Mission, Plan, TaskId, UavId
@@ -313,6 +321,14 @@ def deviations(mission: Mission, result: MissionResult) -> list[ReportFact]:
     if result.epochs > 1:
         found.append(ReportFact("re-planned", f"{result.epochs} epochs"))
     return found
+
+
+def nearest_fact(near: Approach, separation_m: float | None) -> ReportFact:
+    """How near two UAVs came to each other, beside what was asked for."""
+    if separation_m is None:
+        return ReportFact("nearest", approach_in_words(near))
+    asked = f"; {shown_m(separation_m)} m were to be kept"
+    return ReportFact("nearest", approach_in_words(near) + asked, bad=near.is_within(separation_m))
 
 
 _HARMLESS = frozenset({"stale", "not forwarded"})

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import Any
 
+from coordinator.mission_view.approaches import Approach
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import deserted
 from coordinator.mission_view.results import lists_objective
@@ -86,6 +87,12 @@ class Scene:
     """Messages that all agents together have dropped."""
     zone_edits: tuple[ZoneEdit, ...] = ()
     """The operator's newest word about each zone, in this flight."""
+    nearest_now: Approach | None = None
+    """The two UAVs in flight that are nearest to each other."""
+    nearest: Approach | None = None
+    """The nearest that two have come to each other so far."""
+    separation_m: float | None = None
+    """How far they are to keep from each other [m]; None: nobody asks for that."""
 
     @property
     def aborted(self) -> bool:
@@ -178,6 +185,8 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
         commands=tuple(in_force(mission_state.replica).values()),
         dropped=sum(count.total() for count in mission_state.dropped.values()),
         zone_edits=tuple(zone_edits(mission_state.replica).values()),
+        nearest_now=mission_state.nearest_now(now_s),
+        nearest=mission_state.nearest,
     )
 
 

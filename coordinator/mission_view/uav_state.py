@@ -55,7 +55,7 @@ class UavState:
     told_enu_m: Point | None
     """Where it is [m; mission origin] without its height layer; None until it has told."""
     layer_m: float
-    """Height of that layer above its places."""
+    """How much higher than that place it is: its layer, or 0 where it is out of it."""
     velocity_enu_m_s: Point | None
     battery_frac: float | None
     note: str
@@ -195,7 +195,9 @@ class FleetStates:
             claim=None if claim is None else claim.phase,
             there=uav in mission_state.present,
             told_enu_m=None if status is None else status.position_enu_m,
-            layer_m=self._layers_m.get(uav, 0.0),
+            layer_m=self._layers_m.get(uav, 0.0)
+            if status is None or status.layer_m is None
+            else status.layer_m,
             velocity_enu_m_s=None if status is None else status.velocity_enu_m_s,
             battery_frac=None if status is None else status.battery_frac,
             note="" if status is None else status.note,

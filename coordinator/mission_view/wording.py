@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Final
 
+from coordinator.mission_view.approaches import Approach
 from swarm.model.ids import FLEET
 from swarm.model.plan import LeftOut
 from swarm.protocol.board import claim_strength
@@ -30,6 +31,10 @@ _ORDERED = {
     CommandKind.RETURN: "operator sends {} home",
     CommandKind.ABORT: "operator aborts the mission",
 }
+
+
+_EXACT_M = 0.05
+"""A distance that is less off than this is told without saying so."""
 
 
 def shown_s(time_s: float) -> str:
@@ -192,6 +197,23 @@ def place_in_words(position_enu_m: tuple[float, float, float]) -> str:
         if abs(distance_m) >= 0.05
     ]
     return f"{', '.join(parts)} of the origin" if parts else "at the origin"
+
+
+def shown_m(distance_m: float) -> str:
+    """Metres between two UAVs, with as many digits as anyone reads."""
+    return f"{distance_m:.2f}" if distance_m < 9.995 else f"{distance_m:.1f}"
+
+
+def approach_in_words(near: Approach) -> str:
+    """How near two UAVs came to each other, when and where."""
+    error = f" ± {shown_m(near.error_m)} m" if near.error_m >= _EXACT_M else ""
+    when = "before the start" if near.at_s is None else f"at {seconds_in_words(near.at_s)}"
+    one, other = near.places_enu_m
+    middle = tuple(0.5 * (a + b) for a, b in zip(one, other, strict=True))
+    up = " and ".join(f"{place[2]:.4g}" for place in near.places_enu_m)
+    where = place_in_words((middle[0], middle[1], 0.0))
+    apart = f"{' and '.join(near.uavs)} {shown_m(near.distance_m)} m{error} apart"
+    return f"{apart} {when}, {where}, {up} m up"
 
 
 def lateness_in_words(late_s: float) -> str:

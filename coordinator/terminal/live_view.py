@@ -26,7 +26,7 @@ from coordinator.mission_view.presentation import (
 from coordinator.mission_view.results import refusals
 from coordinator.mission_view.scene import LEFT_OUT, TAKEN, Scene, scene_of
 from coordinator.mission_view.story import MissionEvent
-from coordinator.mission_view.wording import clean, shown_value
+from coordinator.mission_view.wording import clean, shown_m, shown_value
 from coordinator.terminal.fleet_table import alerts, fit_cells, fleet_table, table_width, task_lists
 from coordinator.terminal.map_panel import ideal_width, map_panel
 from swarm.protocol.board import TaskState
@@ -288,10 +288,29 @@ def _worth(scene: Scene, width: int, signs: Signs) -> list[Text]:
     bar_width = width - value.cell_len - 2
     if width < _WIDE - _COLUMN:
         bar_width = max(0, width - 8)
-        return [counts, value, Text("       ").append_text(_bar(scene, bar_width, signs))]
+        bar = Text("       ").append_text(_bar(scene, bar_width, signs))
+        return [counts, value, bar, *_nearest(scene, width, signs)]
     value.append("  ")
     value.append_text(_bar(scene, min(60, bar_width), signs))
-    return [counts, value]
+    return [counts, value, *_nearest(scene, width, signs)]
+
+
+def _nearest(scene: Scene, width: int, signs: Signs) -> list[Text]:
+    """Which two UAVs are nearest to each other, and which have been; nothing of a single one."""
+    told = []
+    for near, when in ((scene.nearest_now, "now"), (scene.nearest, "so far")):
+        if near is None:
+            continue
+        at = "" if when == "now" or near.at_s is None else f" at {near.at_s:.1f} s"
+        apart = f"{' '.join(near.uavs)} {shown_m(near.distance_m)} m {when}{at}"
+        style = BAD if near.is_within(scene.separation_m) else ""
+        told.append(Text(clean(apart, ascii_only=not signs.braille), style))
+    heading = Text("near   ", "bold")
+    if heading.cell_len + sum(each.cell_len for each in told) + 3 <= width:
+        return [heading.append_text(Text("   ").join(told))] if told else []
+    return [
+        Text.assemble("       " if number else heading, each) for number, each in enumerate(told)
+    ]
 
 
 def _bar(scene: Scene, width: int, signs: Signs) -> Text:

@@ -14,6 +14,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from coordinator.mission_view.approaches import Approach, approach_as_json
 from coordinator.mission_view.area_report import areas_as_json, areas_in_words
 from coordinator.mission_view.missed import missed_tasks
 from coordinator.mission_view.presentation import BAD, Signs, signs_for, story_style
@@ -26,6 +27,7 @@ from coordinator.mission_view.results import (
     compare_quantities,
     compare_routes,
     deviations,
+    nearest_fact,
     summary_line,
 )
 from coordinator.mission_view.story import MissionEvent, notable
@@ -73,8 +75,11 @@ class MissionReport:
     """What protected it; None if nothing did, or nothing had to."""
     executed_schedule: Schedule = field(default_factory=dict)
     """Where UAVs really went, and when, as far as that is known."""
-    closest_approach_m: float | None = None
-    """Least distance of two UAVs in the air [m]; None of a single one, or if it is not known."""
+    closest_approach: Approach | None = None
+    """The nearest that two UAVs in the air came to each other; None of a single one, or if it is
+    not known."""
+    separation_m: float | None = None
+    """How far they were to keep from each other [m]; None: nobody asked for that."""
     nearest_zone_m: float | None = None
     """Least distance of a UAV in flight from a zone [m]; None without zones, or if not known."""
     lowest_clearance_m: float | None = None
@@ -109,7 +114,7 @@ class MissionReport:
             "executed_completion_s": dict(result.executed_completion_s),
             "executed_objective": result.executed_objective,
             "executed_schedule": schedule_as_json(self.executed_schedule),
-            "closest_approach_m": self.closest_approach_m,
+            **approach_as_json(self.closest_approach, self.separation_m),
             "nearest_zone_m": self.nearest_zone_m,
             "lowest_clearance_m": self.lowest_clearance_m,
             "lowest_charge_frac": dict(self.lowest_charge_frac),
@@ -188,6 +193,8 @@ class MissionReport:
         if self.value is not None and not math.isclose(self.value, self.result.executed_objective):
             text = f"{shown_value(self.value)} value·s: m·(D − t) of each success, failures nothing"
             found.append(ReportFact("by outcomes", text))
+        if (near := self.closest_approach) is not None:
+            found.append(nearest_fact(near, self.separation_m))
         found += self._of_field()
         found += areas_in_words(self.mission, _planned_tasks(self.plan), self.result.done)
         spent = []

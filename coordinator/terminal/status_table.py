@@ -8,10 +8,12 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from coordinator.mission_view.approaches import approach_as_json
 from coordinator.mission_view.presentation import BAD, Signs, uav_colour
 from coordinator.mission_view.scene import LEFT_OUT, TAKEN, Scene
 from coordinator.mission_view.uav_state import ABSENT, LOST, UavView
 from coordinator.mission_view.wording import (
+    approach_in_words,
     because,
     clean,
     command_in_words,
@@ -61,6 +63,8 @@ def status_as_json(scene: Scene) -> dict[str, Any]:
             command.target: {"command": command.kind.value, "reason": command.reason}
             for command in scene.commands
         },
+        **approach_as_json(scene.nearest, scene.separation_m),
+        "nearest_now": None if scene.nearest_now is None else scene.nearest_now.as_json(),
         "uavs": [_uav_as_json(uav) for uav in scene.uavs],
         "dropped": scene.dropped_by_reason,
     }
@@ -98,6 +102,10 @@ def status_table(scene: Scene, width: int, signs: Signs) -> RenderableType:
         facts.add_row("epoch", _line(f"{scene.epoch}: {scene.reason}", signs))
     facts.add_row("tasks", task_counts(scene, signs))
     facts.add_row("J so far", f"{shown_value(scene.objective)} value{signs.product}s")
+    for name, near in (("nearest now", scene.nearest_now), ("nearest so far", scene.nearest)):
+        if near is not None:
+            style = BAD if near.is_within(scene.separation_m) else ""
+            facts.add_row(name, Text(approach_in_words(near), style))
     there = Text("there") if scene.coordinator else Text("not there", BAD)
     facts.add_row("coordinator", there)
     if scene.others:

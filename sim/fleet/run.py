@@ -102,7 +102,7 @@ class RunResult:
             speedup=speedup,
             fates=self.fates,
             executed_schedule=flown.executed_schedule(),
-            closest_approach_m=flown.flights.closest_approach_m,
+            closest_approach=flown.nearest,
             nearest_zone_m=flown.limits.nearest_zone_m,
             lowest_clearance_m=flown.limits.lowest_clearance_m,
             lowest_charge_frac=flown.limits.lowest_charge_frac,

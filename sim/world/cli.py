@@ -134,7 +134,7 @@ def simulate(
             lost_because=flown.lost_because,
             value=flown.value,
             executed_schedule=flown.world.executed_schedule(),
-            closest_approach_m=flown.world.closest_approach_m(),
+            closest_approach=flown.world.closest_approach(),
             left_out=flown.world.mission_state.left_out,
             lowest_clearance_m=flown.world.lowest_clearance_m(),
         )
@@ -170,7 +170,7 @@ def _fly_with_faults(
         result=state.result(),
         story=tuple(state.story),
         executed_schedule=verdict.world.executed_schedule(),
-        closest_approach_m=verdict.world.closest_approach_m(),
+        closest_approach=verdict.world.closest_approach(),
         left_out=state.left_out,
         lowest_clearance_m=verdict.world.lowest_clearance_m(),
     )

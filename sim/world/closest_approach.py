@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from sim.world.flown_path import MotionPiece
+from sim.world.motion import Point
 from sim.world.track import Track
 
 FloatArray = npt.NDArray[np.float64]
@@ -27,6 +28,8 @@ class Approach:
     """In all three dimensions."""
     at_s: float
     uavs: tuple[str, str]
+    places_enu_m: tuple[Point, Point]
+    """Where each of them was [m; mission origin]."""
 
 
 def closest_approach(
@@ -47,9 +50,11 @@ def closest_approach(
     for one, other in itertools.combinations(flown, 2):
         common = list(_common(flown[one], flown[other]))
         for first in range(0, len(common), _AT_ONCE):
-            distance_m, at_s = _nearest(common[first : first + _AT_ONCE])
+            distance_m, at_s, number = _nearest(common[first : first + _AT_ONCE])
             if nearest is None or distance_m < nearest.distance_m:
-                nearest = Approach(distance_m, at_s, (one, other))
+                mine, its, _, _ = common[first + number]
+                places_m = mine.position_enu_m(at_s), its.position_enu_m(at_s)
+                nearest = Approach(distance_m, at_s, (one, other), places_m)
     return nearest
 
 
@@ -71,8 +76,8 @@ def _common(
 
 def _nearest(
     common: Sequence[tuple[MotionPiece, MotionPiece, float, float]],
-) -> tuple[float, float]:
-    """Least distance [m] of two that are there at the same time, and when [s]."""
+) -> tuple[float, float, int]:
+    """Least distance [m] of two that are there at the same time, when [s], and which two."""
     begin_s = np.array([begin for _, _, begin, _ in common])
     lasts_s = np.array([0.0 if end == math.inf else end - begin for _, _, begin, end in common])
     place, velocity, acceleration = _motion([mine for mine, _, _, _ in common], begin_s) - _motion(
@@ -89,12 +94,13 @@ def _nearest(
     )
     candidates_s = np.concatenate([np.zeros((1, len(common))), lasts_s[None], _roots(slope)])
     candidates_s = np.clip(candidates_s, 0.0, lasts_s)
-    at_s = candidates_s[:, :, None]
-    offset_m = place + at_s * (velocity + 0.5 * at_s * acceleration)
+    since_s = candidates_s[:, :, None]
+    offset_m = place + since_s * (velocity + 0.5 * since_s * acceleration)
     distance_m = np.sqrt((offset_m * offset_m).sum(axis=2))
     best = np.unravel_index(distance_m.T.argmin(), distance_m.T.shape)
     row, number = int(best[1]), int(best[0])
-    return float(distance_m[row, number]), float(begin_s[number] + candidates_s[row, number])
+    at_s = float(begin_s[number] + candidates_s[row, number])
+    return float(distance_m[row, number]), at_s, number
 
 
 def _motion(pieces: Sequence[MotionPiece], at_s: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 from agent.core.interface import (
@@ -33,6 +34,8 @@ from sim.world.motion import IdealMotion, Point, between, flown_s, minus, plus
 from sim.world.track import Track, drifting
 from sim.world.uncertainty import Realization
 from swarm.model import UavId
+from swarm.protocol.messages import MissionConfig
+from swarm.protocol.uav_messages import Status
 
 
 class SimulatedVehicle(Protocol):
@@ -53,6 +56,24 @@ class SimulatedVehicle(Protocol):
 
 VehicleFactory = Callable[[EventQueue, str, Callable[[VehicleReport], None]], SimulatedVehicle]
 """Makes the vehicle of a UAV in a queue's time; it says what it has to say by the callback."""
+
+
+def as_flown(uav: str, status: Status, told: Telemetry | None, brief: MissionConfig) -> Status:
+    """``status`` with the place that its vehicle would have told by now.
+
+    Real vehicles tell theirs all the time; ideal ones only when their agents hear something else,
+    which saves time, and nothing that agents decide hangs on what is between.
+    """
+    if told is None or status.position_enu_m is None:
+        return status
+    layers_m = {spec.id: spec.layer_m for spec in brief.uavs}
+    east_m, north_m, up_m = told.position_enu_m
+    below_m = layers_m[uav] if status.layer_m is None else status.layer_m
+    return replace(
+        status,
+        position_enu_m=(east_m, north_m, up_m - below_m),
+        velocity_enu_m_s=told.velocity_enu_m_s,
+    )
 
 
 class TracedVehicle:

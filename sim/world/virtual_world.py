@@ -35,6 +35,7 @@ from coordinator.core.lifecycle import (
     Withdraw,
 )
 from coordinator.core.standby import StandbyCore
+from coordinator.mission_view.approaches import Approach
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.operator.commands import CommandRequest
 from coordinator.operator.requests import OperatorClient, OperatorRequest
@@ -52,7 +53,7 @@ from sim.world.settings import (
     WorldSettings,
 )
 from sim.world.track import Track
-from sim.world.vehicles import SimulatedVehicle, TracedVehicle
+from sim.world.vehicles import SimulatedVehicle, TracedVehicle, as_flown
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.model.layers import FlightLayers
@@ -60,7 +61,7 @@ from swarm.model.plan import Schedule
 from swarm.protocol.events import Ask, Finish, LogLine, Publish, PublishLast, Save
 from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoch, Snapshot
 from swarm.protocol.timing import Timing
-from swarm.protocol.uav_messages import BaseStage, Claim, Outcome
+from swarm.protocol.uav_messages import BaseStage, Claim, Outcome, Status
 from swarm.runtime.shell import Core
 
 ONLOOKER = "onlooker"
@@ -175,8 +176,18 @@ class World:
 
     def closest_approach_m(self) -> float | None:
         """Least distance of two UAVs while both were in the air [m]; None if never two were."""
-        nearest = closest_approach(self.tracks)
+        nearest = self.closest_approach()
         return None if nearest is None else nearest.distance_m
+
+    def closest_approach(self) -> Approach | None:
+        """The nearest that two UAVs in the air truly came to each other; None if never two were."""
+        nearest = closest_approach(self.tracks)
+        if nearest is None:
+            return None
+        at_s = None
+        if self.zero_s is not None and nearest.at_s >= self.zero_s:
+            at_s = nearest.at_s - self.zero_s
+        return Approach(nearest.distance_m, at_s, nearest.uavs, nearest.places_enu_m)
 
     def lowest_clearance_m(self) -> float | None:
         """Least height of a UAV in flight above the ground [m]; None where there is no terrain."""
@@ -330,6 +341,8 @@ class World:
         elif isinstance(message.body, Outcome) and message.writer == process.name:
             ended, times_s = message.body, (self.queue.now_s(), self.zero_s or 0.0)
             self.flight_log.attempt_ended(process.name, ended.task, ended.attempt, *times_s)
+        elif isinstance(message.body, Status):
+            message = replace(message, body=self._as_flown(process.name, message.body))
         self.network.publish(process, message)
         if self._watch is not None:
             self._watch.said(process, message)
@@ -367,6 +380,12 @@ class World:
         self.fallen_s[uav] = self.queue.now_s()
         self.when_fallen(uav)
         self.lose(uav)
+
+    def _as_flown(self, uav: str, status: Status) -> Status:
+        vehicle, brief = self._vehicles.get(uav), self.mission_state.replica.brief
+        if vehicle is None or brief is None:
+            return status
+        return as_flown(uav, status, vehicle.telemetry(), brief)
 
     def _telemetry(self, uav: str) -> Telemetry | None:
         return self._vehicles[uav].telemetry()

@@ -109,6 +109,7 @@ SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
     TaskEdit: _OF_TASKS,
     Claim: frozenset(_OF_CLAIMS),
     Outcome: frozenset({"reversed"}),
+    Status: frozenset({"layer_m"}),
     Choice: frozenset({"base"}),
     ChoiceBasis: frozenset({"sortie_end_s", "landed_at", "parked", "blocking", "flown_m"}),
     Calibration: frozenset({"land_s", "climb_s", "acceleration_m_s2", "speed_m_s"}),

@@ -272,7 +272,7 @@ class Status(Checked):
     phase: StatusPhase
     task: Id | None
     position_enu_m: Point | None
-    """[m; mission origin], without the height layer."""
+    """Where it is now [m; mission origin], without the height layer."""
     velocity_enu_m_s: Point | None
     battery_frac: Probability | None
     mission_s: Instant | None
@@ -282,3 +282,12 @@ class Status(Checked):
     there were too many."""
     note: Words
     """What it waits for, in words."""
+    layer_m: Metres | None = None
+    """How much higher than that position it is [m]; None: by the brief's layer."""
+
+    def flown_enu_m(self, layer_m: float) -> Point | None:
+        """Where it really is [m; mission origin]; ``layer_m`` is its layer in the brief."""
+        if self.position_enu_m is None:
+            return None
+        east_m, north_m, up_m = self.position_enu_m
+        return east_m, north_m, up_m + (layer_m if self.layer_m is None else self.layer_m)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from coordinator.mission_view.approaches import ObservedApproaches
 from coordinator.mission_view.observed_flights import ObservedFlights
 from sim.world.simulation import simulate_mission
 from sim.world.uncertainty import Uncertainty
@@ -74,13 +75,13 @@ def mission_tasks(mission: Mission) -> set[str]:
 
 
 def test_who_turned_aside_in_flight_set_off_from_there() -> None:
-    flights = ObservedFlights()
+    flights = ObservedFlights(ObservedApproaches(5.0))
     flights.hear("u0", Claim(ClaimPhase.HELD, "t0", 0.0, 0, 7.0))
     for at_s in (1.0, 2.0, 3.0):
-        flights.hear_status("u0", status(StatusPhase.FLYING, at_s, 10.0 * at_s), 10.0)
+        flights.hear_status("u0", status(StatusPhase.FLYING, at_s, 10.0 * at_s), 10.0, (), at_s)
     for _ in range(2):  # said again when it is held, from farther on
         flights.hear("u0", Claim(ClaimPhase.HELD, "line", 3.1, 0, 40.0))
-        flights.hear_status("u0", status(StatusPhase.FLYING, 4.0, 25.0), 10.0)
+        flights.hear_status("u0", status(StatusPhase.FLYING, 4.0, 25.0), 10.0, (), 4.0)
     flights.hear("u0", Outcome("line", AttemptResult.DONE, 1, 40.0))
 
     (entry,) = flights.executed_schedule(MISSION)[UavId("u0")]
@@ -89,7 +90,7 @@ def test_who_turned_aside_in_flight_set_off_from_there() -> None:
 
 
 def test_who_had_nothing_to_do_for_a_while_sets_off_when_it_says_so() -> None:
-    flights = ObservedFlights()
+    flights = ObservedFlights(ObservedApproaches(5.0))
     for mission_s, phase in ((30.0, ClaimPhase.PROPOSED), (30.4, ClaimPhase.HELD)):
         flights.hear("u0", Claim(phase, "t0", 10.0, 0, 37.0), mission_s)
     flights.hear("u0", Outcome("t0", AttemptResult.DONE, 1, 37.0), 37.0)
@@ -100,7 +101,7 @@ def test_who_had_nothing_to_do_for_a_while_sets_off_when_it_says_so() -> None:
 
 
 def test_swaps_lines_and_the_way_home_are_told() -> None:
-    flights = ObservedFlights()
+    flights = ObservedFlights(ObservedApproaches(5.0))
     approach = Claim(
         ClaimPhase.HELD, None, 0.0, 0, 20.0, base="b0", stage=BaseStage.APPROACHING, arrives_s=9.0
     )
@@ -113,7 +114,7 @@ def test_swaps_lines_and_the_way_home_are_told() -> None:
         flights.hear("u0", claim)
         if claim is out:
             flights.hear("u0", Outcome("line", AttemptResult.DONE, 1, 40.0))
-    flights.hear_status("u0", status(StatusPhase.HOME, 50.0, 0.0), 10.0)
+    flights.hear_status("u0", status(StatusPhase.HOME, 50.0, 0.0), 10.0, (), 50.0)
     entries = flights.executed_schedule(MISSION)[UavId("u0")]
 
     assert [entry.go for entry in entries] == ["base:b0", "line", "start"]
@@ -123,46 +124,21 @@ def test_swaps_lines_and_the_way_home_are_told() -> None:
     assert (entries[2].depart_s, entries[2].arrive_s) == (41.0, 50.0)
 
 
-def test_the_closest_approach_is_between_the_lines_that_were_told() -> None:
-    flights = ObservedFlights()
-    for at_s, place_m in ((0.0, 0.0), (10.0, 100.0)):
-        flights.hear_status("u0", status(StatusPhase.FLYING, at_s, place_m), 10.0)
-    for at_s, place_m in ((1.0, 90.0), (9.0, 10.0)):
-        flights.hear_status("u1", status(StatusPhase.FLYING, at_s, place_m, 4.0), 13.0)
-    assert flights.closest_approach_m == pytest.approx(5.0)
-
-    flights.hear_status("u1", status(StatusPhase.HOME, 10.0, 100.0), 10.0)
-    assert flights.closest_approach_m == pytest.approx(5.0)
-
-
 def test_of_a_fleet_that_said_nothing_nothing_is_told() -> None:
-    flights = ObservedFlights()
+    flights = ObservedFlights(ObservedApproaches(5.0))
 
     assert flights.executed_schedule(MISSION) == {UavId("u0"): (), UavId("u1"): ()}
-    assert flights.closest_approach_m is None
-
-
-def test_who_stands_at_a_base_comes_close_to_nobody() -> None:
-    flights, base = ObservedFlights(), MISSION.bases[0].position_enu_m
-    landed = Claim(
-        ClaimPhase.HELD, None, 0.0, 0, 19.5, base="b0", stage=BaseStage.LANDED, arrives_s=9.5
-    )
-    flights.hear("u0", landed)
-    for mission_s in (10.0, 11.0, 12.0):
-        flights.hear_status("u0", status(StatusPhase.SERVING, mission_s, *base[:2]), 10.0, [base])
-        flights.hear_status("u1", status(StatusPhase.FLYING, mission_s, *base[:2]), 13.0, [base])
-
-    assert flights.closest_approach_m is None
+    assert flights.approaches.nearest is None
 
 
 def test_a_list_that_ends_at_a_base_has_no_other_way_home() -> None:
-    flights = ObservedFlights()
+    flights = ObservedFlights(ObservedApproaches(5.0))
     landed = Claim(
         ClaimPhase.HELD, None, 0.0, 0, 19.5, base="b0", stage=BaseStage.LANDED, arrives_s=9.5
     )
     parked = Claim(ClaimPhase.IDLE, None, 19.5, 0, 19.5, base="b0", stage=BaseStage.PARKED)
     for claim in (landed, parked, Claim(ClaimPhase.OUT, None, 41.0, 0, 41.0)):
         flights.hear("u0", claim)
-    flights.hear_status("u0", status(StatusPhase.HOME, 41.0, 5.0, 5.0), 10.0)
+    flights.hear_status("u0", status(StatusPhase.HOME, 41.0, 5.0, 5.0), 10.0, (), 41.0)
 
     assert [entry.go for entry in flights.executed_schedule(MISSION)["u0"]] == ["base:b0"]  # type: ignore[index]

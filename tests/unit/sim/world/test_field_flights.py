@@ -37,7 +37,7 @@ def complaints(flown: SimulatedMission, draft: Mapping[str, Any]) -> list[str]:
         result=flown.result,
         story=(),
         executed_schedule=flown.world.executed_schedule(),
-        closest_approach_m=flown.world.closest_approach_m(),
+        closest_approach=flown.world.closest_approach(),
     )
     return check_simulation(as_flown(draft, flown.world.mission), report.as_json())
 
