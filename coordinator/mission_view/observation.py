@@ -36,6 +36,8 @@ class MissionObserver:
             for ever.
         complete: keep the state's mission like the board, which takes 0.1 s a change for
             100 UAVs and 1000 tasks; else its board alone tells the tasks.
+        explains: see `MissionState`.
+        near_m: see `MissionState`.
     """
 
     def __init__(
@@ -46,9 +48,10 @@ class MissionObserver:
         *,
         complete: bool = True,
         explains: bool = False,
+        near_m: float | None = None,
     ) -> None:
         unknown = Mission(mission, horizon_s=1.0, uavs=(), tasks=())
-        self.mission_state = MissionState(unknown, timing, explains=explains)
+        self.mission_state = MissionState(unknown, timing, explains=explains, near_m=near_m)
         self._name = mission
         self._patience_s = patience_s
         self._complete = complete

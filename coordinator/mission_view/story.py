@@ -54,6 +54,8 @@ class EventKind(StrEnum):
     DONE = "done"
     FAILED = "failed"
     LIST = "list"
+    NEAR = "near"
+    """Two UAVs came near to each other; in explanations alone."""
     PLANNED = "planned"
 
 

@@ -204,16 +204,17 @@ def shown_m(distance_m: float) -> str:
     return f"{distance_m:.2f}" if distance_m < 9.995 else f"{distance_m:.1f}"
 
 
-def approach_in_words(near: Approach) -> str:
-    """How near two UAVs came to each other, when and where."""
+def approach_in_words(near: Approach, *, told_at: bool = True) -> str:
+    """How near two UAVs came to each other, where, and when unless that is said otherwise."""
     error = f" ± {shown_m(near.error_m)} m" if near.error_m >= _EXACT_M else ""
-    when = "before the start" if near.at_s is None else f"at {seconds_in_words(near.at_s)}"
-    one, other = near.places_enu_m
-    middle = tuple(0.5 * (a + b) for a, b in zip(one, other, strict=True))
-    up = " and ".join(f"{place[2]:.4g}" for place in near.places_enu_m)
-    where = place_in_words((middle[0], middle[1], 0.0))
     apart = f"{' and '.join(near.uavs)} {shown_m(near.distance_m)} m{error} apart"
-    return f"{apart} {when}, {where}, {up} m up"
+    if told_at:
+        when = "before the start" if near.at_s is None else f"at {seconds_in_words(near.at_s)}"
+        apart = f"{apart} {when}"
+    one, other = near.places_enu_m
+    up = " and ".join(f"{place[2]:.4g}" for place in near.places_enu_m)
+    between = 0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1]), 0.0
+    return f"{apart}, {place_in_words(between)}, {up} m up"
 
 
 def lateness_in_words(late_s: float) -> str:

@@ -192,15 +192,27 @@ def explain(
         str | None,
         typer.Option("--uav", metavar="UAV", help="Tell its story.", show_default=False),
     ] = None,
+    near_m: Annotated[
+        float,
+        typer.Option(
+            "--near-m",
+            min=0.0,
+            metavar="M",
+            help="Tell every time that another UAV came as near as this to it, or to who did the "
+            "task on the way there.",
+        ),
+    ] = 20.0,
     json: JsonOption = False,
 ) -> int:
     """Tell a task's or a UAV's story from a recording.
 
-    In sentences, event by event, with the reason of each choice.
+    In sentences, event by event, with the reason of each choice, and with how near other UAVs
+    came in flight.
 
     Examples:
         swarm explain flight.mcap --task t7
         swarm explain flight.mcap --uav uav3
+        swarm explain flight.mcap --uav uav3 --near-m 50
         swarm explain flight.mcap --task t7 --json
     """
     from json import dumps
@@ -211,9 +223,9 @@ def explain(
 
     match task, uav:
         case str(), None:
-            told = explain_task(_read(file), task)
+            told = explain_task(_read(file), task, near_m)
         case None, str():
-            told = explain_uav(_read(file), uav)
+            told = explain_uav(_read(file), uav, near_m)
         case _:
             problem = "neither is given" if task is None else "both are given"
             remedy = "give one of them, such as --task t1"

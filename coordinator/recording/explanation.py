@@ -11,12 +11,14 @@ from rich.console import Console, Group
 from rich.table import Table
 from rich.text import Text
 
+from coordinator.mission_view.approaches import NEAR_M, Approach
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import MissionObserver
 from coordinator.mission_view.presentation import BAD
 from coordinator.mission_view.results import dues_of, progress_of
 from coordinator.mission_view.story import EventKind, MissionEvent
 from coordinator.mission_view.wording import (
+    approach_in_words,
     clean,
     listed,
     seconds_in_words,
@@ -48,6 +50,8 @@ class Explanation:
     objective: float
     """J of all that was done [value·s]."""
     ending: str
+    approaches: tuple[Approach, ...] = ()
+    """How near other UAVs came to it, or to who did it on the way there."""
 
     def render(self, console: Console) -> None:
         """Print it for people, in the width of ``console``."""
@@ -80,17 +84,23 @@ class Explanation:
                 }
                 for event in self.events
             ],
+            "approaches": [near.as_json() for near in self.approaches],
             "ending": self.ending,
         }
 
 
-def explain_task(recording: Recording, task: str) -> Explanation:
+def explain_task(recording: Recording, task: str, near_m: float = NEAR_M) -> Explanation:
     """The story of ``task``.
+
+    Args:
+        recording: of a mission.
+        task: which.
+        near_m: how near others came to who did it is told from here on [m].
 
     Raises:
         InputError: the recording has no such task.
     """
-    mission_state = _explained(recording)
+    mission_state = _explained(recording, near_m)
     states = mission_state.board.states
     if task not in states:
         raise _unknown(recording, "--task", task, states)
@@ -99,6 +109,7 @@ def explain_task(recording: Recording, task: str) -> Explanation:
     events = _without_most_passings(
         [event for event in mission_state.story if task in event.tasks], task
     )
+    approaches = _on_the_way(mission_state, events, by, at_s)
     state, share = states[task], _share(worth, objective)
     match state:
         case TaskState.DONE:
@@ -119,21 +130,28 @@ def explain_task(recording: Recording, task: str) -> Explanation:
         mission=recording.mission,
         subject="task",
         id=task,
-        events=events,
+        events=_with(events, approaches),
         state=state.value,
         worth=worth,
         objective=objective,
         ending=ending,
+        approaches=approaches,
     )
 
 
-def explain_uav(recording: Recording, uav: str) -> Explanation:
+def explain_uav(recording: Recording, uav: str, near_m: float = NEAR_M) -> Explanation:
     """The story of ``uav``.
+
+    Args:
+        recording: of a mission.
+        uav: which.
+        near_m: how near others came to it is told from here on [m].
 
     Raises:
         InputError: the recording has no such UAV.
     """
-    mission_state = _explained(recording)
+    mission_state = _explained(recording, near_m)
+    approaches = tuple(mission_state.flights.approaches.of(uav))
     fleet = [each.id for each in mission_state.mission.uavs]
     if uav not in fleet:
         raise _unknown(recording, "--uav", uav, fleet)
@@ -163,17 +181,50 @@ def explain_uav(recording: Recording, uav: str) -> Explanation:
         mission=recording.mission,
         subject="uav",
         id=uav,
-        events=tuple(event for event in mission_state.story if uav in event.uavs),
+        events=_with([event for event in mission_state.story if uav in event.uavs], approaches),
         state=state,
         worth=worth,
         objective=objective,
         ending=f"So {uav} {did}{but}, and {how}.",
+        approaches=approaches,
     )
 
 
-def _explained(recording: Recording) -> MissionState:
+def _on_the_way(
+    mission_state: MissionState, events: Sequence[MissionEvent], uav: str, done_s: float
+) -> tuple[Approach, ...]:
+    """How near others came to ``uav`` from its first claim on the task until that was done."""
+    claimed_s = [
+        event.mission_s or 0.0
+        for event in events
+        if event.kind is EventKind.CLAIMED and uav in event.uavs
+    ]
+    return tuple(
+        near
+        for near in mission_state.flights.approaches.of(uav)
+        if claimed_s and near.at_s is not None and min(claimed_s) <= near.at_s <= done_s
+    )
+
+
+def _with(
+    events: Sequence[MissionEvent], approaches: Sequence[Approach]
+) -> tuple[MissionEvent, ...]:
+    """The story with how near UAVs came to each other, each before what happened later."""
+    told = list(events)
+    for near in approaches:
+        text = approach_in_words(near, told_at=False)
+        line = MissionEvent(near.at_s, text, EventKind.NEAR, uavs=frozenset(near.uavs))
+        at_s = near.at_s or 0.0
+        later = (place for place, event in enumerate(told) if (event.mission_s or 0.0) > at_s)
+        told.insert(next(later, len(told)), line)
+    return tuple(told)
+
+
+def _explained(recording: Recording, near_m: float) -> MissionState:
     """All that was known in the end, its story told with all reasons."""
-    observer = MissionObserver(recording.mission, recording.timing, None, explains=True)
+    observer = MissionObserver(
+        recording.mission, recording.timing, None, explains=True, near_m=near_m
+    )
     observer.start(recording.start_s)
     for entry in recording.entries:
         observer.step(entry.fact, entry.now_s)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from coordinator.mission_view.story import EventKind
 from coordinator.recording.explanation import Explanation, explain_task, explain_uav
 from coordinator.recording.growing_mcap import Patch
 from coordinator.recording.reader import Recording, read_recording
@@ -278,3 +279,28 @@ def test_what_is_not_there_is_refused_with_what_is(tape: Tape) -> None:
         explain_task(recording, "t11")
     with pytest.raises(InputError, match="has no such uav; choose one of u0, u1"):
         explain_uav(recording, "nobody")
+
+
+def test_how_near_others_came_is_told_where_it_happened(tape: Tape) -> None:
+    """One flies to its task over another that hovers, and later waits far away."""
+    tape.say("u0", held("t0", 0.0, completion_s=10.0), 0.3)
+    for tick in range(60):
+        mission_s = 0.5 + 0.2 * tick
+        flown_m = min(40.0, 8.0 * mission_s) - 20.0
+        for name, east_m, up_m in (("u0", flown_m, 40.0), ("u1", 0.0, 34.0)):
+            body = replace(status(StatusPhase.FLYING, (east_m, 0.0, up_m)), mission_s=mission_s)
+            tape.say(name, replace(body, layer_m=0.0), mission_s)
+    tape.say("u0", done("t0", 11.0), 13.0)
+    recording = tape.stop()
+
+    told, of_task = explain_uav(recording, "u0", near_m=10.0), explain_task(recording, "t0", 10.0)
+
+    said = [event for event in told.events if event.kind is EventKind.NEAR]
+    assert [event.mission_s for event in said] == pytest.approx([2.5])
+    assert said[0].text.startswith("u0 and u1 6.00 m apart, at the origin, 40 and 34 m up")
+    assert said[0] in of_task.events
+    assert [near.uavs for near in told.approaches] == [("u0", "u1")]
+    kinds = [event.kind for event in of_task.events]
+    assert kinds.index(EventKind.NEAR) < kinds.index(EventKind.DONE)
+    assert explain_uav(recording, "u0", near_m=5.0).approaches == ()
+    assert explain_task(recording, "t1", near_m=10.0).approaches == ()
