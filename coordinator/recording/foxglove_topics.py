@@ -37,7 +37,7 @@ from coordinator.recording.foxglove_schemas import (
     text,
 )
 from coordinator.recording.records import FileMessage
-from swarm.model import Base, Origin, Zone
+from swarm.model import Area, Base, Origin, Zone
 from swarm.model.frames import wgs84_from_enu
 from swarm.protocol.board import TaskState
 
@@ -55,6 +55,7 @@ _OF_MISSION: Final = 1.0 / 60.0
 """Size of a task, as a part of the mission's extent."""
 _GREY: Final = (0.6, 0.6, 0.6, 0.5)
 _ZONE: Final = (0.84, 0.37, 0.0, 0.9)
+_AREA: Final = (0.0, 0.45, 0.7, 0.9)
 _BASE: Final = (0.8, 0.47, 0.65, 0.9)
 _WHITE: Final = (1.0, 1.0, 1.0, 1.0)
 # Okabe and Ito's colours; states differ in shape and opacity, too.
@@ -121,6 +122,7 @@ class FoxgloveTopics:
         self._zones: tuple[Zone, ...] = ()
         self._drawn: set[str] = set()
         """Zones that were shown: of one that was taken away nothing is to stay."""
+        self._areas: tuple[Area, ...] = ()
         self._bases: tuple[tuple[Base, str], ...] = ()
         self._told = 0
         """Lines of the story that have been told."""
@@ -155,7 +157,10 @@ class FoxgloveTopics:
             yield _scene("lists", entities)
 
     def _field(self, scene: Scene, size_m: float, time_ns: int) -> Iterator[FileMessage]:
-        """Zones in force, and bases with who is there; nothing of a mission without them."""
+        """Areas, zones in force, and bases with who is there; nothing of what there is none of."""
+        if scene.mission.areas != self._areas:
+            self._areas = scene.mission.areas
+            yield _scene("areas", [_area(area, time_ns) for area in self._areas])
         zones = scene.mission.zones
         if zones != self._zones:
             self._zones = zones
@@ -268,6 +273,18 @@ def _zone(zone: Zone, time_ns: int) -> Json:
     return entity(f"zone {zone.id}", FRAME, time_ns, facts, lines=lines, texts=[label])
 
 
+def _area(area: Area, time_ns: int) -> Json:
+    """Its borders, on the ground."""
+    lines = [
+        line_strip([(east_m, north_m, 0.0) for east_m, north_m in (*ring, ring[0])], _AREA, 2.0)
+        for ring in (area.polygon_enu_m, *area.holes_enu_m)
+    ]
+    east_m, north_m = area.polygon_enu_m[0]
+    facts = {"lines": str(area.lines), "value": f"{area.value:g}"}
+    label = text((east_m, north_m, 0.0), area.id, _WHITE)
+    return entity(f"area {area.id}", FRAME, time_ns, facts, lines=lines, texts=[label])
+
+
 def _visitors(scene: Scene, base: Base) -> str:
     """Who is there or on the way, and what about."""
     return ", ".join(
@@ -287,6 +304,8 @@ def _base(base: Base, who: str, size_m: float, time_ns: int) -> Json:
 def _task_entities(scene: Scene, size_m: float, time_ns: int) -> list[Json]:
     """One entity for each state: what nobody has ended is a ball, what is over a box.
 
+    Lines to fly along are drawn besides.
+
     That of the tasks that the plan leaves out tells why.
     """
     tasks, entities = scene.tasks, []
@@ -298,9 +317,14 @@ def _task_entities(scene: Scene, size_m: float, time_ns: int) -> list[Json]:
             else (cube, "cubes")
         )
         solids = [shape(at, size_m, colour) for at in mine]
+        ways = [
+            line_strip(task.path_enu_m, colour, 2.0)
+            for task in tasks
+            if task.stands == state and task.path_enu_m
+        ]
         facts = scene.left_out if state == LEFT_OUT else {"tasks": str(len(mine))}
         name = state.replace("_", " ")
-        entities.append(entity(name, FRAME, time_ns, facts, **{kind: solids}))
+        entities.append(entity(name, FRAME, time_ns, facts, lines=ways, **{kind: solids}))
     if len(tasks) <= MOST_LABELS:
         labels = [text(_raised(t.position_enu_m, -size_m), t.id, _WHITE) for t in tasks]
         entities.append(entity("names", FRAME, time_ns, {}, texts=labels))

@@ -17,19 +17,26 @@ pytestmark = [pytest.mark.process]
 
 
 def crossing() -> Mission:
-    """Four UAVs, each with a task on the other side of where they all start from."""
+    """Four UAVs, each of which is able to do the one task that lies beyond all others' starts."""
     starts = ((-60.0, 0.0), (60.0, 0.0), (0.0, -60.0), (0.0, 60.0))
     return Mission(
         name="crossing",
         horizon_s=300.0,
         uavs=tuple(
-            Uav(UavId(f"uav{number}"), (*start, 0.0), 8.0, acceleration_m_s2=2.5)
+            Uav(
+                UavId(f"uav{number}"),
+                (*start, 0.0),
+                8.0,
+                success={f"t{number}": 1.0},
+                acceleration_m_s2=2.5,
+            )
             for number, start in enumerate(starts)
         ),
         tasks=tuple(
             Task(TaskId(f"t{number}"), (-1.5 * east_m, -1.5 * north_m, 0.0), 5.0, service_s=2.0)
             for number, (east_m, north_m) in enumerate(starts)
         ),
+        success_default=0.0,
         schema=2,
     )
 

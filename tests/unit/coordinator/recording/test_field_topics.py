@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from coordinator.recording.foxglove_topics import FoxgloveTopics
-from swarm.model import Mission, Zone, ZoneId
+from swarm.model import Area, AreaId, Mission, Task, TaskId, Zone, ZoneId
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.field_messages import ZoneEdit, ZoneSpec
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, StatusPhase
@@ -75,6 +76,27 @@ def test_zones_are_drawn_and_one_that_is_taken_away_is_not_drawn_any_more(teller
     assert viewer.scenes["zones"]["zone pond"]["lines"] == []
     assert len(viewer.scenes["zones"]["zone crowd"]["lines"]) == 2
     assert facts(viewer.scenes["zones"]["zone crowd"]) == {"ceiling": "50 m"}
+
+
+def test_areas_are_drawn_with_their_holes_and_lines_by_how_they_stand() -> None:
+    hole = ((50.0, 10.0), (70.0, 10.0), (70.0, 20.0))
+    hay = Area(AreaId("hay"), ((0.0, 0.0), (90.0, 0.0), (90.0, 60.0)), 5.0, (hole,), 20.0, lines=1)
+    path = ((10.0, 5.0, 0.0), (80.0, 5.0, 0.0))
+    line = Task(TaskId("hay-1"), path[0], 5.0, path_enu_m=path)
+    flown = replace(pasture(), tasks=(line,), areas=(hay,))
+    told, viewer = Teller(flown), Viewer()
+    told.say(COORDINATOR, field_registers.brief_of(flown))
+    told.say(COORDINATOR, replace(entries_of(flown)[0], path_enu_m=path))
+    told.begin()
+    viewer.look(told)
+
+    (drawn,) = viewer.scenes["areas"].values()
+    assert [len(ring["points"]) for ring in drawn["lines"]] == [4, 4]
+    assert facts(drawn) == {"lines": "1", "value": "5"}
+    (way,) = viewer.scenes["tasks"]["open"]["lines"]
+    assert [(point["x"], point["y"]) for point in way["points"]] == [(10, 5), (80, 5)]
+    assert viewer.scenes["tasks"]["done"]["lines"] == []
+    assert "/scene/areas" not in viewer.look(told), "nothing has changed"
 
 
 def test_a_base_tells_who_is_there_and_a_uav_its_sortie(teller: Teller) -> None:
