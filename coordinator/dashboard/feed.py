@@ -16,6 +16,7 @@ import swarm
 from coordinator.dashboard.baseline import Baseline, baseline_of
 from coordinator.dashboard.rows import AppendOnlyTable, RowTable, as_text
 from coordinator.dashboard.source import DashboardSource
+from coordinator.mission_view.approaches import Approach
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import Progress, progress_of
 from coordinator.mission_view.scene import LEFT_OUT, TAKEN, task_stands
@@ -244,6 +245,10 @@ class Feed:
             "coordinator": COORDINATOR in present,
             "aborted": mission_state is not None
             and abort_command(mission_state.replica) is not None,
+            "nearest": {
+                "now": None if mission_state is None else _near(mission_state.nearest_now(now_s)),
+                "so_far": None if mission_state is None else _near(mission_state.nearest),
+            },
             "counts": counts,
             "dropped": dict(dropped.most_common()),
             "dropped_here": dict(self._source.dropped),
@@ -364,7 +369,7 @@ class Feed:
 
 
 def _uav_row(state: UavState, command: str | None, speedup: float) -> dict[str, object]:
-    age_s = state.link_age_s
+    age_s, in_layer = state.link_age_s, state.in_layer_enu_m
     return {
         "id": state.id,
         "does": state.now_does,
@@ -373,6 +378,7 @@ def _uav_row(state: UavState, command: str | None, speedup: float) -> dict[str, 
         "eta_s": _rounded(state.now_eta_s, 1),
         "position": _point(state.told_enu_m),
         "velocity": _point(state.velocity_enu_m_s),
+        "height_m": None if in_layer is None else _rounded(in_layer[2], 1),
         "battery": _rounded(state.battery_frac, 3),
         "base": state.base,
         "stage": state.stage,
@@ -385,6 +391,18 @@ def _uav_row(state: UavState, command: str | None, speedup: float) -> dict[str, 
         "note": clean(state.note),
         "command": command,
         "dropped": dict(state.dropped),
+    }
+
+
+def _near(near: Approach | None) -> dict[str, object] | None:
+    if near is None:
+        return None
+    return {
+        "uavs": near.uavs,
+        "distance_m": _rounded(near.distance_m, 2),
+        "error_m": _rounded(near.error_m, 2),
+        "at_s": _rounded(near.at_s, 2),
+        "places": [_point(place) for place in near.places_enu_m],
     }
 
 

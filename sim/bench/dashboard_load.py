@@ -136,7 +136,7 @@ async def measure_dashboard(
     """
     machine, clock = this_machine(), SystemClock()
     mission = survey_mission(uavs, tasks, seed)
-    async with _served(mission.name) as (endpoint, dashboard, url):
+    async with served(mission.name) as (endpoint, dashboard, url):
         bus = await open_zenoh_bus(BusConfig(ClientTopology((endpoint,))))
         try:
             acted = ScriptedMission(mission, bus, clock, rate_hz, seed)
@@ -174,7 +174,7 @@ async def measure_dashboard(
 
 
 @contextlib.asynccontextmanager
-async def _served(mission: str) -> AsyncIterator[tuple[str, ChildProcess, str]]:
+async def served(mission: str) -> AsyncIterator[tuple[str, ChildProcess, str]]:
     """A router's endpoint, the dashboard's process and its feed."""
     async with contextlib.AsyncExitStack() as stack:
         listening = ["router", "--json", "--listen", "tcp/127.0.0.1:0"]

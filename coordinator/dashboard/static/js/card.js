@@ -11,6 +11,12 @@ import { NOTHING, TASK_SIGNS, degrees, number, percent, place, seconds, stateWor
 
 const LAST_CHOICES = 3;
 
+/** How high a UAV is above the origin, and its layer. */
+function heightOf(row, { layer_m: layer }) {
+  const above = row.height_m === null ? NOTHING : `${number(row.height_m)} m`;
+  return layer === undefined ? above : `${above}, layer ${number(layer)} m`;
+}
+
 export class Card {
   /** `on`: `{select(kind, id), centre(position), choices(of), close()}`. */
   constructor(element, picture, operator, on) {
@@ -124,7 +130,7 @@ export class Card {
       described.endurance_s ? ["Batteries changed", String(row.swaps ?? 0)] : null,
       ["Heard", row.silent_s === null ? "never" : `${seconds(row.silent_s)} ago`],
       described.kind ? ["Kind", described.kind] : null,
-      ["Layer", described.layer_m === undefined ? NOTHING : `${number(described.layer_m)} m`],
+      ["Height", heightOf(row, described)],
       row.command ? ["Operator", row.command] : null,
       row.note ? ["Note", row.note] : null,
       Object.keys(row.dropped ?? {}).length ? ["Dropped", reasons(row.dropped)] : null,

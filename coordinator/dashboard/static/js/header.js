@@ -2,7 +2,7 @@
 
 import { byId, make, setAttribute, setText } from "./dom.js";
 import { isTroubled } from "./fleet.js";
-import { NOTHING, TASK_STATES, count, number, percent, seconds, stateWord } from "./words.js";
+import { NOTHING, TASK_STATES, count, metres, number, percent, seconds, stateWord } from "./words.js";
 
 const PHASES = { preparing: "preparing", running: "running", ended: "ended" };
 const RESTING = ["home", "out", "lost", "absent"];
@@ -44,6 +44,9 @@ export class Header {
     );
     setAttribute(byId("figure-lost"), "class", lost ? "trouble" : null);
     this.#tasks(head?.counts);
+    const { now, so_far: soFar } = head?.nearest ?? {};
+    setText(byId("figure-near"), now ? metres(now.distance_m) : NOTHING);
+    setText(byId("figure-nearest"), soFar ? `least ${metres(soFar.distance_m)}` : "");
     byId("abort").hidden = !(hello?.commands && hello.kind === "live" && mission);
     byId("abort").disabled = Boolean(head?.aborted || head?.phase === "ended");
     this.showConnection();

@@ -1,7 +1,7 @@
 // Drawing the mission on two canvases: what changes with frames below, what moves above.
 
 import { uavColour } from "./colours.js";
-import { taskState } from "./words.js";
+import { metres, taskState } from "./words.js";
 
 const WIDE = 2 * Math.PI;
 /** Pixels per letter of all names from which on tasks are named. */
@@ -370,6 +370,7 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
     const [x, y] = view.spot(target.position);
     line(canvas, spot[0], spot[1], x, y);
   }
+  paintNearest(canvas, view, picture, motion, look);
   const labels = [];
   for (const [id, spot] of spots) {
     if (view.holds(spot))
@@ -377,6 +378,30 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
   }
   paintLabels(canvas, labels, look, 1);
   for (const ghost of look.ghosts) paintGhost(canvas, view.spot(ghost.position), ghost.label, look);
+}
+
+/** The two UAVs that are nearest to each other now, and where two have been nearest so far. */
+function paintNearest(canvas, view, picture, motion, look) {
+  const { now, so_far: soFar } = picture.head?.nearest ?? {};
+  const { ink } = look;
+  if (soFar) {
+    const [[x, y], [otherX, otherY]] = soFar.places.map((position) => view.spot(position));
+    canvas.strokeStyle = ink.muted;
+    canvas.lineWidth = 1.5;
+    cross(canvas, (x + otherX) / 2, (y + otherY) / 2, 4);
+    const text = `least ${metres(soFar.distance_m)}`;
+    label(canvas, text, (x + otherX) / 2 + 8, (y + otherY) / 2 - 6, ink.muted, look);
+  }
+  if (!now) return;
+  const [one, other] = now.uavs.map((id) => motion.shown.get(id)?.at);
+  if (!one || !other) return;
+  const [[x, y], [otherX, otherY]] = [one, other].map((position) => view.spot(position));
+  canvas.strokeStyle = ink.text;
+  canvas.lineWidth = 1.5;
+  canvas.setLineDash([2, 3]);
+  line(canvas, x, y, otherX, otherY);
+  canvas.setLineDash([]);
+  label(canvas, metres(now.distance_m), (x + otherX) / 2 + 8, (y + otherY) / 2 + 16, ink.text, look);
 }
 
 function paintUav(canvas, picture, motion, row, [x, y], look) {
@@ -408,7 +433,7 @@ function paintUav(canvas, picture, motion, row, [x, y], look) {
   canvas.restore();
   const chosen = look.selected === row.id;
   return {
-    text: chosen ? told(row, picture) : described.short,
+    text: chosen ? told(row, picture) : described.short + high(row),
     weight: chosen ? 2 : Number(troubled),
     x: x + size + 3,
     y: y + 4,
@@ -430,11 +455,16 @@ function paintLabels(canvas, labels, look, always) {
   }
 }
 
+/** At which height it flies, beside its name. */
+function high(row) {
+  return row.height_m === null || row.height_m < 1 ? "" : ` ${row.height_m.toFixed(0)} m`;
+}
+
 /** Id, target and rule of the UAV that is selected. */
 function told(row, picture) {
   const goal = row.task ?? row.base;
   const target = goal ? ` → ${goal}` : ` ${row.does}`;
-  return `${row.id}${target}${picture.head.rule ? ` · ${picture.head.rule}` : ""}`;
+  return `${row.id}${high(row)}${target}${picture.head.rule ? ` · ${picture.head.rule}` : ""}`;
 }
 
 function paintGhost(canvas, [x, y], text, look) {

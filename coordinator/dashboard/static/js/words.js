@@ -69,6 +69,11 @@ export function seconds(value) {
   return sign + (hours ? `${hours}:${pad(minutes)}:${pad(rest)}` : `${minutes}:${pad(rest)}`);
 }
 
+/** Metres between two UAVs: the nearer the more digits. */
+export function metres(value) {
+  return value === null || value === undefined ? NOTHING : `${number(value, value < 10 ? 2 : 1)} m`;
+}
+
 /** A share of 1 in percent. */
 export function percent(fraction, digits = 0) {
   if (fraction === null || fraction === undefined || !Number.isFinite(fraction)) return NOTHING;

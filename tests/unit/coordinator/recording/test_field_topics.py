@@ -86,8 +86,8 @@ def test_areas_are_drawn_with_their_holes_and_lines_by_how_they_stand() -> None:
     flown = replace(pasture(), tasks=(line,), areas=(hay,))
     told, viewer = Teller(flown), Viewer()
     told.say(COORDINATOR, field_registers.brief_of(flown))
-    told.say(COORDINATOR, replace(entries_of(flown)[0], path_enu_m=path))
     told.begin()
+    told.say(COORDINATOR, replace(entries_of(flown)[0], path_enu_m=path))
     viewer.look(told)
 
     (drawn,) = viewer.scenes["areas"].values()
