@@ -5,14 +5,14 @@ Leaves out: the lines themselves (coordinator.plot.field).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from coordinator.plot.labels import Label
 from coordinator.plot.looks import LATE, marker
-from swarm.model import Area, Mission, Plan, TaskId
+from swarm.model import Area, Mission, TaskId
 from swarm.survey.coverage import AreaCoverage, covered
 
 if TYPE_CHECKING:
@@ -36,16 +36,16 @@ def area_places_m(mission: Mission) -> list[tuple[float, float]]:
     return [corner for area in mission.areas for corner in area.polygon_enu_m]
 
 
-def draw_areas(axes: Axes, mission: Mission, plan: Plan) -> None:
-    """The outline of each, light where planned lines cover it, marked where they do not."""
+def draw_areas(axes: Axes, mission: Mission, met: Collection[TaskId]) -> None:
+    """The outline of each, light where these tasks cover it, marked where they do not."""
     import shapely
 
     for area in mission.areas:
         coverage = AreaCoverage(area, mission.tasks, mission.zones, mission.zone_margin_m)
-        lines = [line for name, line in coverage.lines.items() if name in plan.completion_s]
-        met = covered(area, lines)
-        _fill(axes, shapely.intersection(coverage.to_cover, met), _COVERED, 0.4)
-        _fill(axes, shapely.difference(coverage.to_cover, met), LATE, 0.5)
+        lines = [line for name, line in coverage.lines.items() if name in met]
+        shape = covered(area, lines)
+        _fill(axes, shapely.intersection(coverage.to_cover, shape), _COVERED, 0.4)
+        _fill(axes, shapely.difference(coverage.to_cover, shape), LATE, 0.5)
         for ring in (area.polygon_enu_m, *area.holes_enu_m):
             corners_m = np.array([*ring, ring[0]])
             axes.plot(*corners_m.T, color=_OUTLINE, linewidth=1.1, zorder=0.8)
@@ -79,4 +79,4 @@ def _name_place_m(area: Area) -> tuple[float, float]:
 def area_legend(mission: Mission) -> Iterator[Line2D]:
     """What their marks mean."""
     if mission.areas:
-        yield marker("s", _COVERED, _OUTLINE, "area; light: covered by these lists")
+        yield marker("s", _COVERED, _OUTLINE, "area; light: covered")

@@ -263,7 +263,18 @@ def stops(entries: Sequence[ScheduleEntry]) -> list[str]:
 
 
 def field_legend(mission: Mission, plan: Plan) -> Iterator[Line2D]:
-    """What the marks of the field mean."""
+    """What the marks of the field in a plan mean."""
+    from matplotlib.lines import Line2D
+
+    yield from place_legend(mission)
+    if any((plan.schedule or {}).values()):
+        yield Line2D([], [], color=SHARED, linewidth=_HOME_POINTS, label="way home")
+    if plan.left_out:
+        yield marker("X", "white", LATE, wrapped("left out:", list(plan.left_out)))
+
+
+def place_legend(mission: Mission) -> Iterator[Line2D]:
+    """What the marks of lines, bases and zones mean."""
     from matplotlib.lines import Line2D
 
     if any(task.path_enu_m for task in mission.tasks):
@@ -280,7 +291,3 @@ def field_legend(mission: Mission, plan: Plan) -> Iterator[Line2D]:
     if mission.zones:
         margin = f", paths {mission.zone_margin_m:g} m away" if mission.zone_margin_m else ""
         yield marker("s", "#F4D4D4", _KEEP_OUT, f"no flying{margin}")
-    if any((plan.schedule or {}).values()):
-        yield Line2D([], [], color=SHARED, linewidth=_HOME_POINTS, label="way home")
-    if plan.left_out:
-        yield marker("X", "white", LATE, wrapped("left out:", list(plan.left_out)))

@@ -54,23 +54,32 @@ def draw_plan(mission: Mission, plan: Plan, path: Path) -> None:
         ValueError: the suffix is not one of `PLOT_SUFFIXES`.
         OSError: the file cannot be written.
     """
+    save_figure(plan_figure(mission, plan), path)
+
+
+def save_figure(figure: Figure, path: Path) -> None:
+    """Write a picture to ``path``; its suffix says which kind.
+
+    Raises:
+        ValueError: the suffix is not one of `PLOT_SUFFIXES`.
+        OSError: the file cannot be written.
+    """
     kind = path.suffix.lower().lstrip(".")
     if f".{kind}" not in PLOT_SUFFIXES:
         raise ValueError(f"path must end in {', '.join(PLOT_SUFFIXES)}, not {path.name!r}")
-    # without its date the same plan gives the same file
+    # without its date the same picture gives the same file
     dated: dict[str, dict[str, str | None]] = {
         "svg": {"Date": None},
         "pdf": {"CreationDate": None},
     }
-    metadata = dated.get(kind, {})
-    plan_figure(mission, plan).savefig(path, format=kind, dpi=160, metadata=metadata)
+    figure.savefig(path, format=kind, dpi=160, metadata=dated.get(kind, {}))
 
 
 def plan_figure(mission: Mission, plan: Plan) -> Figure:
     """The picture as a matplotlib figure, without any window."""
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=_size_inches(mission), layout="constrained")
+    figure = Figure(figsize=size_inches(mission), layout="constrained")
     axes = figure.add_subplot()
     looks = dict(zip(plan.routes, path_styles(len(plan.routes)), strict=True))
     diameters = _diameters_points(mission)
@@ -79,10 +88,10 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     else:
         for uav, entries in plan.schedule.items():
             draw_schedule(axes, mission, entries, looks[uav])
-    draw_areas(axes, mission, plan)
+    draw_areas(axes, mission, plan.completion_s)
     _draw_tasks(axes, mission, plan, looks, diameters)
     draw_bases(axes, mission)
-    _draw_starts(axes, mission, looks)
+    draw_starts(axes, mission, looks)
     axes.set_aspect("equal", adjustable="box")
     axes.margins(0.09)
     draw_zones(axes, mission)
@@ -98,7 +107,7 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     return figure
 
 
-def _size_inches(mission: Mission) -> tuple[float, float]:
+def size_inches(mission: Mission) -> tuple[float, float]:
     """A map as large as its number of names needs, with the legend beside it."""
     places = _places_m(mission)
     width_m, height_m = np.maximum(np.ptp(np.array(places), axis=0), 1e-9)
@@ -197,7 +206,8 @@ def _is_late(mission: Mission, plan: Plan, task: Task) -> bool:
     return task.due_s is None and plan.completion_s[task.id] > mission.horizon_s
 
 
-def _draw_starts(axes: Axes, mission: Mission, looks: Mapping[UavId, PathStyle]) -> None:
+def draw_starts(axes: Axes, mission: Mission, looks: Mapping[UavId, PathStyle]) -> None:
+    """A triangle for each start, or for several that are close together."""
     for uavs in _start_groups(mission):
         colour = looks[uavs[0].id].colour if len(uavs) == 1 else SHARED
         axes.plot(

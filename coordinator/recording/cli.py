@@ -147,6 +147,16 @@ def replay(
             "--final", help="Only print how the mission stood in the end, as swarm status does."
         ),
     ] = False,
+    plot: Annotated[
+        Path | None,
+        typer.Option(
+            "--plot",
+            metavar="FILE.png|svg|pdf",
+            help="Only draw the flight over the map and the plan: ways flown, zones, areas and "
+            "what is covered of them.",
+            show_default=False,
+        ),
+    ] = None,
     json: JsonOption = False,
     port: Annotated[
         int,
@@ -165,6 +175,7 @@ def replay(
         swarm replay flight.mcap --speed 20 --port 8080 --no-browser
         swarm replay flight.mcap --final
         swarm replay flight.mcap --final --json
+        swarm replay flight.mcap --plot flight.png
     """
     from rich.console import Console
 
@@ -172,6 +183,9 @@ def replay(
     from coordinator.recording.playback import Playback
     from coordinator.terminal.cli import print_status
 
+    if plot is not None:
+        _draw(file, plot)
+        return 0
     playback = Playback(_read(file), speed)
     if final:
         playback.seek(playback.duration_s)
@@ -245,6 +259,22 @@ def _read(file: Path) -> Recording:
     if recording.torn is not None:
         print(f"swarm: {recording.torn}; what comes before is whole", file=sys.stderr)
     return recording
+
+
+def _draw(file: Path, picture: Path) -> None:
+    """Draw the flight in ``file``."""
+    from coordinator.plot import PLOT_SUFFIXES, draw_flight
+    from coordinator.recording.flown_tracks import flight_of
+
+    if picture.suffix.lower() not in PLOT_SUFFIXES:
+        remedy = f"end it in {', '.join(PLOT_SUFFIXES)}"
+        raise InputError(Fault("--plot", str(picture), "no such kind of picture is drawn", remedy))
+    try:
+        draw_flight(flight_of(_read(file)), picture)
+    except OSError as error:
+        problem = f"cannot be written: {error.strerror or error}"
+        raise InputError(Fault("--plot", str(picture), problem, "name a file that can")) from error
+    print(f"drawn: {picture}", file=sys.stderr)
 
 
 def _warn(line: str) -> None:

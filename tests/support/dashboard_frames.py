@@ -31,7 +31,11 @@ _RECORD = """
 () => {
   window.deltas = [];
   let last = performance.now();
-  const next = (now) => { window.deltas.push(now - last); last = now; requestAnimationFrame(next); };
+  const next = (now) => {
+    window.deltas.push(now - last);
+    last = now;
+    requestAnimationFrame(next);
+  };
   requestAnimationFrame(next);
 }
 """
