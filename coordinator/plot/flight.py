@@ -34,7 +34,6 @@ from swarm.survey.facts import area_facts
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
 
 MapTrack = Sequence[tuple[float, float]]
 """Places on the map, one after the other [m]."""
@@ -155,8 +154,8 @@ def _draw_legend(figure: Figure, flight: Flight, looks: Mapping[UavId, PathStyle
         for uav in mission.uavs
     ]
     if any(_planned(flight)):
-        look = {"color": _PLANNED.colour, "linestyle": _PLANNED.dashes}
-        handles.append(Line2D([], [], label="as planned before the start", **look))
+        label, (colour, dashes) = "as planned before the start", (_PLANNED.colour, _PLANNED.dashes)
+        handles.append(Line2D([], [], color=colour, linestyle=dashes, label=label))
     handles.append(marker("^", SHARED, "white", "start"))
     if any(task.id not in flight.done_by for task in mission.tasks):
         handles.append(marker("X", "white", UNPLANNED, "not done"))

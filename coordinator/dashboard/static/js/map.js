@@ -285,7 +285,7 @@ export class MissionMap {
     if (uav) return ["uav", uav];
     const look = { size: this.taskSize, mostValue: this.mostValue };
     const task = near(this.taskSpots, (id) =>
-      Math.max(11, taskRadius(this.picture.tasks.get(id)?.value ?? 0, look) + 4),
+      Math.max(11, taskRadius(this.picture.tasks.get(id) ?? { value: 0 }, look) + 4),
     );
     return task ? ["task", task] : null;
   }

@@ -4,6 +4,10 @@ import { uavColour } from "./colours.js";
 import { metres, taskState } from "./words.js";
 
 const WIDE = 2 * Math.PI;
+/** Radius of the first point of a line [px]. */
+const LINE_END = 3.5;
+/** From so many tasks on lines have no names, but for the one that is selected. */
+const MOST_NAMED_LINES = 40;
 /** Pixels per letter of all names from which on tasks are named. */
 const ROOM_PER_LETTER = 330;
 
@@ -25,9 +29,10 @@ export class View {
   }
 }
 
-/** Radius of a task of that value [px]. */
-export function taskRadius(value, look) {
-  return look.size * (0.55 + 0.75 * Math.sqrt(Math.max(0, value) / look.mostValue));
+/** Radius of a task by its value [px]; of a line, which is drawn itself, its first point is small. */
+export function taskRadius(task, look) {
+  const radius = look.size * (0.55 + 0.75 * Math.sqrt(Math.max(0, task.value) / look.mostValue));
+  return task.path?.length ? Math.min(LINE_END, radius) : radius;
 }
 
 /** Everything below the UAVs: grid, lists, trails, tasks. Fills `spots` with where tasks are. */
@@ -267,15 +272,18 @@ function paintTasks(canvas, view, picture, look, spots) {
   const weight = (task) => (task.state === "open" ? 2 : task.state === "failed" ? 1 : 0);
   inView.sort((one, other) => weight(one[0]) - weight(other[0]));
   for (const [task, spot] of inView) paintTask(canvas, task, spot, picture, look);
-  const letters = inView.reduce((sum, [task]) => sum + task.id.length, 0);
+  const named = inView.filter(
+    ([task]) => !task.path?.length || picture.tasks.size < MOST_NAMED_LINES || look.selected === task.id,
+  );
+  const letters = named.reduce((sum, [task]) => sum + task.id.length, 0);
   if (view.width * view.height < letters * ROOM_PER_LETTER) return;
   canvas.font = `11px ${look.ink.font}`;
   canvas.textAlign = "center";
-  const labels = inView.map(([task, [x, y]]) => ({
+  const labels = named.map(([task, [x, y]]) => ({
     text: task.id,
     weight: weight(task) + (look.selected === task.id ? 10 : 0),
     x,
-    y: y + taskRadius(task.value, look) + 12,
+    y: y + taskRadius(task, look) + 12,
     colour: task.state === "open" ? look.ink.text : look.ink.muted,
   }));
   paintLabels(canvas, labels, look, 10);
@@ -286,7 +294,7 @@ function paintTask(canvas, task, [x, y], picture, look) {
   const { ink } = look;
   const state = taskState(task);
   const colour = task.uav ? uavColour(picture.described(task.uav).number, ink.dark) : ink.text;
-  let radius = taskRadius(task.value, look);
+  let radius = taskRadius(task, look);
   canvas.lineWidth = radius > 5 ? 2 : 1.5;
   canvas.fillStyle = ink.ground;
   canvas.strokeStyle = colour;

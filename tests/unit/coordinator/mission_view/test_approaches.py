@@ -36,7 +36,7 @@ def heard(
 ) -> ObservedApproaches:
     """All of them, in the order in which they were said."""
     observed = ObservedApproaches(GAP_S, near_m)
-    said = [(at_s, uav, *rest) for uav, each in fixes.items() for at_s, *rest in each]
+    said = [(at_s, uav, p, v) for uav, each in fixes.items() for at_s, p, v in each]
     for at_s, uav, place, velocity in sorted(said):
         observed.fly(uav, at_s, place, velocity, started=True)
     return observed
