@@ -44,7 +44,7 @@ _LABEL_POINTS = 8.0
 
 
 @dataclass(frozen=True, slots=True)
-class Flight:
+class DrawnFlight:
     """What is drawn of a mission that was flown."""
 
     mission: Mission
@@ -58,7 +58,7 @@ class Flight:
     makespan_s: float = 0.0
 
 
-def draw_flight(flight: Flight, path: Path) -> None:
+def draw_flight(flight: DrawnFlight, path: Path) -> None:
     """Write the picture of ``flight`` to ``path``; its suffix says which kind.
 
     Raises:
@@ -68,7 +68,7 @@ def draw_flight(flight: Flight, path: Path) -> None:
     save_figure(flight_figure(flight), path)
 
 
-def flight_figure(flight: Flight) -> Figure:
+def flight_figure(flight: DrawnFlight) -> Figure:
     """The picture as a matplotlib figure, without any window."""
     from matplotlib.figure import Figure
 
@@ -101,12 +101,12 @@ def flight_figure(flight: Flight) -> Figure:
     return figure
 
 
-def _planned(flight: Flight) -> Iterator[Sequence[ScheduleEntry]]:
+def _planned(flight: DrawnFlight) -> Iterator[Sequence[ScheduleEntry]]:
     if flight.plan is not None and flight.plan.schedule is not None:
         yield from flight.plan.schedule.values()
 
 
-def _draw_tracks(axes: Axes, flight: Flight, looks: Mapping[UavId, PathStyle]) -> None:
+def _draw_tracks(axes: Axes, flight: DrawnFlight, looks: Mapping[UavId, PathStyle]) -> None:
     for uav, tracks in flight.tracks.items():
         for track in tracks:
             places_m = np.array(track)
@@ -115,7 +115,7 @@ def _draw_tracks(axes: Axes, flight: Flight, looks: Mapping[UavId, PathStyle]) -
             axes.plot(*tracks[-1][-1], marker="X", markersize=11.0, color=LATE, zorder=6.0)
 
 
-def _draw_tasks(axes: Axes, flight: Flight, looks: Mapping[UavId, PathStyle]) -> None:
+def _draw_tasks(axes: Axes, flight: DrawnFlight, looks: Mapping[UavId, PathStyle]) -> None:
     of_areas = lines_of_areas(flight.mission)
     for task in flight.mission.tasks:
         if task.id in of_areas:
@@ -132,14 +132,14 @@ def _draw_tasks(axes: Axes, flight: Flight, looks: Mapping[UavId, PathStyle]) ->
         )
 
 
-def _draw_nearest(axes: Axes, flight: Flight) -> None:
+def _draw_nearest(axes: Axes, flight: DrawnFlight) -> None:
     if flight.nearest is None:
         return
     east_m, north_m, _ = np.mean(np.array(flight.nearest.places_enu_m), axis=0)
     axes.plot(east_m, north_m, marker="+", markersize=13.0, color=SHARED, mew=1.8, zorder=6.0)
 
 
-def _draw_legend(figure: Figure, flight: Flight, looks: Mapping[UavId, PathStyle]) -> None:
+def _draw_legend(figure: Figure, flight: DrawnFlight, looks: Mapping[UavId, PathStyle]) -> None:
     from matplotlib.lines import Line2D
 
     mission, done = flight.mission, list(flight.done_by.values())
@@ -176,7 +176,7 @@ def _draw_legend(figure: Figure, flight: Flight, looks: Mapping[UavId, PathStyle
     ).get_title().set_fontweight("bold")
 
 
-def _title(flight: Flight) -> str:
+def _title(flight: DrawnFlight) -> str:
     """What was done, when, and how much is covered."""
     mission, done = flight.mission, flight.done_by
     lines = [f"{len(done)} of {len(mission.tasks)} tasks in {shown_s(flight.makespan_s)} s"]

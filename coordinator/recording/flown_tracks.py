@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from coordinator.mission_view.mission_state import FEW_S, FEW_STATUSES
 from coordinator.mission_view.observation import MissionObserver
-from coordinator.plot import Flight
+from coordinator.plot import DrawnFlight
 from coordinator.recording.reader import Recording
 from swarm.model import UavId
 from swarm.protocol.events import MessageReceived
 from swarm.protocol.uav_messages import Status
 
 
-def flight_of(recording: Recording) -> Flight:
+def flight_of(recording: Recording) -> DrawnFlight:
     """The whole flight; of one that goes on, as far as it was recorded."""
     timing = recording.timing
     observer = MissionObserver(recording.mission, timing, None)
@@ -35,7 +35,7 @@ def flight_of(recording: Recording) -> Flight:
         ways[-1].append(body.position_enu_m[:2])
     state = observer.mission_state
     result = state.result()
-    return Flight(
+    return DrawnFlight(
         mission=state.mission,
         tracks={uav.id: tracks.get(uav.id, []) for uav in state.mission.uavs},
         done_by={task: UavId(uav) for task, uav in result.done_by.items()},

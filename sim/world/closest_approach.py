@@ -21,7 +21,7 @@ _AT_ONCE = 100_000
 
 
 @dataclass(frozen=True, slots=True)
-class Approach:
+class TrueApproach:
     """Two vehicles at the instant at which they are nearest."""
 
     distance_m: float
@@ -34,7 +34,7 @@ class Approach:
 
 def closest_approach(
     tracks: dict[str, Track], since_s: float = 0.0, until_s: float = math.inf
-) -> Approach | None:
+) -> TrueApproach | None:
     """Of all pairs the nearest, both in the air; None if never two were.
 
     While both accelerate evenly the square of their distance is a polynomial of degree four, so its
@@ -46,7 +46,7 @@ def closest_approach(
         until_s: what comes later, alike [s].
     """
     flown = {uav: track.pieces(since_s, until_s) for uav, track in tracks.items()}
-    nearest: Approach | None = None
+    nearest: TrueApproach | None = None
     for one, other in itertools.combinations(flown, 2):
         common = list(_common(flown[one], flown[other]))
         for first in range(0, len(common), _AT_ONCE):
@@ -54,7 +54,7 @@ def closest_approach(
             if nearest is None or distance_m < nearest.distance_m:
                 mine, its, _, _ = common[first + number]
                 places_m = mine.position_enu_m(at_s), its.position_enu_m(at_s)
-                nearest = Approach(distance_m, at_s, (one, other), places_m)
+                nearest = TrueApproach(distance_m, at_s, (one, other), places_m)
     return nearest
 
 

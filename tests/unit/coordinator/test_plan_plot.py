@@ -184,7 +184,7 @@ def test_an_area_is_shown_whole_and_what_no_list_covers_stands_out() -> None:
     )
 
     found = texts(whole)
-    assert {"hay", "farm", "paddock", "barn", "area; light: covered by these lists"} <= set(found)
+    assert {"hay", "farm", "paddock", "barn", "area; light: covered"} <= set(found)
     assert not any(text.startswith("hay-") for text in found[: len(whole.axes[0].texts)])
     light, dark = ("#DCEDC8", LATE)
     assert shaded_m2(whole, dark) < 0.005 * shaded_m2(whole, light)
