@@ -36,7 +36,8 @@ class Announcer:
         self._turn = 0
         self._stretch = 1.0
         self._news: set[str] = set()
-        """Keys of own registers with something new since the last announcement."""
+        """Keys of own registers with something new since it was last repeated to anybody."""
+        self._linked = True
         self._free_at_s = -math.inf
         """When somebody may be greeted again."""
         self._announce_at_s: float | None = None
@@ -75,6 +76,10 @@ class Announcer:
     def stretch(self, stretch: float) -> None:
         """From now on repeat what is not new that much more seldom; see `stretch_of`."""
         self._stretch = stretch
+
+    def link(self, up: bool) -> None:
+        """The own link came up or went down; what is said without one is news when it is back."""
+        self._linked = up
 
     def remember(self, message: Message) -> None:
         """An earlier life said so, and this one has claimed nothing yet."""
@@ -116,7 +121,8 @@ class Announcer:
         for _ in range(min(at_once, len(rest))):
             self._turn = (self._turn + 1) % len(rest)
             said.append(rest[self._turn])
-        self._news.clear()
+        if self._linked:
+            self._news.clear()
         self._announce_at_s = now_s + self._stretch * self._timing.announce_s
         return [
             self.say(message.body)

@@ -108,7 +108,8 @@ class StateSync(AgentPart):
     def _insist(self, now_s: float) -> None:
         """Ask again while somebody is there who has not answered: it may know the newest.
 
-        At the start once; after a link came back until the others' had the time to.
+        At the start once; after a link came back until the others' had the time to. Of many only
+        some are asked then, and whatever they know is told.
         """
         silent = self._peers.membership.present - self._answered - {self._uav}
         if not silent:
@@ -116,14 +117,19 @@ class StateSync(AgentPart):
         if not self._machine.acts and not self._insisted:
             self._insisted = True
             self.queries.doubt(now_s, of=silent)
-        elif self._machine.acts and now_s < self._insists_until_s:
+        elif self._machine.acts and now_s < self._insists_until_s and not self._are_many:
             self.queries.doubt(now_s + 2.0 * self._timing.ask_gap_s, of=silent)
 
-    def _catch_up(self, now_s: float, *, everyone: bool) -> None:
+    @property
+    def _are_many(self) -> bool:
+        """Whether there are too many to ask everyone."""
+        return bool(some_of(self._uav, self._peers.membership.present))
+
+    def _catch_up(self, now_s: float) -> None:
         """What the others did meanwhile is unknown, and they may be back later than this one."""
         self._answered.clear()
         self._insists_until_s = now_s + self._timing.relink_grace_s
-        self.queries.doubt(now_s, everyone=everyone)
+        self.queries.doubt(now_s)
 
     def remember(self, memory: Snapshot, now_s: float) -> None:
         """An earlier life of this agent knew so."""
@@ -216,14 +222,15 @@ class StateSync(AgentPart):
     def link(self, up: bool, now_s: float) -> None:
         """The own link came up or went down."""
         self._peers.membership.link(up, now_s)
+        self._announcer.link(up)
         if up and self.queries.ever:
-            self._catch_up(now_s, everyone=True)
+            self._catch_up(now_s)
             self._greet_all(now_s)
 
     def held_up(self, now_s: float) -> None:
         """This process was stopped or starved; what the others did meanwhile is unread."""
         self._peers.membership.held_up(now_s)
-        self._catch_up(now_s, everyone=False)  # what was said meanwhile has yet to be read
+        self._catch_up(now_s)
         self._log("held up")
 
     def lose(self, now_s: float) -> None:

@@ -192,11 +192,20 @@ def test_who_is_back_is_asked_for_sure_and_of_few_everyone_is() -> None:
     assert asked(small.lose("u5", 1.0)) == [()]
 
 
-def test_after_the_own_link_was_down_everyone_is_asked_of_any_fleet() -> None:
+def test_what_was_said_without_a_link_is_repeated_when_it_is_back_and_some_are_asked() -> None:
     agent = fleet(100)
+    keep_alive(agent, 20.0)
     agent.happen(LinkChanged(False))
-    agent.now_s += 1.0
-    assert asked(agent.happen(LinkChanged(True))) == [()]
+    agent.arrive(21.0)
+    agent.run_until(21.0 + 3.0 * TIMING.announce_s)
+    back = agent.happen(LinkChanged(True))
+
+    assert {outcome.task for outcome in outcomes(back)} >= {"t0"}
+    assert {claim.task for claim in claims(back)} == {"t1"}
+    (first,) = asked(back)
+    assert len(first) == 2 + SOME
+    again = agent.learn() + agent.run_until(agent.now_s - 200.0 + TIMING.relink_grace_s)
+    assert asked(again) == [], "who was not asked is not waited for"
 
 
 def test_one_who_asks_for_all_is_told_what_others_have_said_but_the_coordinators_words() -> None:
