@@ -134,7 +134,7 @@ class Announcer:
     def greet(self, now_s: float) -> list[Publish]:
         """Somebody is there anew: repeat the own registers, once for all who come together."""
         if now_s >= self._free_at_s:
-            self._free_at_s = now_s + self._timing.ask_gap_s
+            self._free_at_s = now_s + self._stretch * self._timing.ask_gap_s
             return self.announce(now_s)
         self._announce_at_s = earliest(self._announce_at_s, self._free_at_s)
         return []

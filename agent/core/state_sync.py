@@ -314,6 +314,7 @@ class StateQueries:
         elif self._again_at_s is not None and self._again_at_s <= now_s:
             self._asking.want(now_s)
             self._again_at_s = None  # until that question has been asked
+        self._asking.stretch = stretch_of(len(present))
         if not self._asking.due(now_s):
             return []
         self._open += 1

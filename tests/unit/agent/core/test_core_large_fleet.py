@@ -107,10 +107,11 @@ def test_many_who_come_together_are_greeted_together() -> None:
     agent.run_until(agent.now_s - 200.0 + 2.0 * TIMING.loss_delay_s)
     for n in range(1, 60):
         agent.happen(PeerSeen(f"u{n}"))
-    agent.run_until(agent.now_s - 200.0 + 1.5 * TIMING.ask_gap_s)
+    agent.run_until(agent.now_s - 200.0 + 1.5 * stretch_of(100) * TIMING.ask_gap_s)
 
     assert notes(agent.log[before:]).count("back") == 59
-    assert 1 <= len(claims(agent.log[before:])) <= 4
+    assert 1 <= len(claims(agent.log[before:])) <= 3
+    assert 1 <= len(asked(agent.log[before:])) <= 5
 
 
 def test_a_uav_of_a_large_fleet_may_be_silent_longer_and_the_coordinator_may_not() -> None:
