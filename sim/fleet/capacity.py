@@ -9,9 +9,10 @@ from __future__ import annotations
 import os
 from typing import Final
 
-CPU_FRAC_PER_UAV: Final = 0.025
-"""Of one processor: an agent (1.6 %), its simulated autopilot (0.2 to 0.4 %), and what router,
-coordinator and launcher do for it, and a little more."""
+CPU_FRAC_PER_UAV: Final = 0.01
+"""Of one processor, in the midst of a mission of 100: an agent (0.56 %), its simulated autopilot
+(0.17 %), what router, coordinator and launcher do for it (0.1 %), and a little more. Starting takes
+more, for longer then."""
 BYTES_PER_UAV: Final = 45 * 10**6
 """Of an agent (26 MB) and an autopilot of its own (18 MB), shares of common pages included."""
 BYTES_BESIDES: Final = 500 * 10**6

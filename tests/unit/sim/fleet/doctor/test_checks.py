@@ -128,7 +128,7 @@ def test_clocks_are_judged_by_date_synchronisation_and_running(
 
 
 def test_a_machine_is_judged_by_the_fleet_it_is_to_carry() -> None:
-    small = ResourceLimits(cpus=2, open_files=1024, memory_bytes=5e9)
+    small = ResourceLimits(cpus=1, open_files=1024, memory_bytes=5e9)
 
     assert states(*check_limits(small, 10)) == [CheckState.OK] * 3
     assert states(*check_limits(small, 120)) == [
