@@ -1,0 +1,239 @@
+"""Height layers that a fleet shares, and the slabs of air round them.
+
+A slab reaches half-way to the neighbouring layers; the lowest and the highest have no end. Two
+paths that come closer than the separation anywhere are both within half of it from one slab at
+least, so whoever keeps the paths of each slab apart, as seen from above, keeps all apart.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+Path = npt.NDArray[np.float64]
+"""(k, 3) corners of what a UAV flies [m; east, north, up from the mission origin]; one: it
+hovers."""
+
+HEIGHT_ERROR_M = 1.0
+"""By which a UAV may be higher or lower than it takes itself to be [m]."""
+
+
+def layer_spacing_m(separation_m: float) -> float:
+    """Least distance of two shared layers [m]: that of two UAVs, both wrong in their heights."""
+    return separation_m + 2.0 * HEIGHT_ERROR_M
+
+
+def shared_layers_m(
+    separation_m: float, n_uav: int, band_m: tuple[float, float] | None, lowest_m: float
+) -> tuple[float, ...]:
+    """Heights that a fleet shares, lowest first [m above the places that are visited].
+
+    Args:
+        separation_m: smallest distance of two UAVs [m]; > 0.
+        n_uav: how many there are; without a band each finds a layer of its own.
+        band_m: lowest and greatest height [m]; None: from ``lowest_m`` up.
+        lowest_m: height of the lowest layer where there is no band [m].
+    """
+    spacing_m = layer_spacing_m(separation_m)
+    if band_m is None:
+        return tuple(lowest_m + index * spacing_m for index in range(n_uav))
+    low_m, high_m = band_m
+    # A band of exactly so many layers has room for the last one, whatever is rounded.
+    count = 1 + math.floor((high_m - low_m) / spacing_m + 1e-9)
+    return tuple(low_m + index * spacing_m for index in range(count))
+
+
+@dataclass(frozen=True, slots=True)
+class Slabs:
+    """The air, cut at heights between shared layers.
+
+    Raises:
+        ValueError: heights do not grow by `layer_spacing_m` at least, or there are none.
+    """
+
+    separation_m: float
+    """Smallest distance of two UAVs [m]."""
+    layers_m: tuple[float, ...]
+    """Heights of the layers over a place at the height of the mission's origin [m]."""
+
+    def __post_init__(self) -> None:
+        gaps_m = np.diff(self.layers_m)
+        least_m = layer_spacing_m(self.separation_m) - 1e-6
+        if not self.layers_m or (gaps_m < least_m).any():
+            raise ValueError(f"layers {self.layers_m} are nearer than {least_m:g} m")
+
+    def __len__(self) -> int:
+        return len(self.layers_m)
+
+    def reach_m(self, slab: int) -> tuple[float, float]:
+        """Heights from which one may come too near to somebody in ``slab`` [m]."""
+        heights_m, near_m = self.layers_m, 0.5 * self.separation_m
+        low_m, high_m = -math.inf, math.inf
+        if slab > 0:
+            low_m = 0.5 * (heights_m[slab - 1] + heights_m[slab]) - near_m
+        if slab + 1 < len(heights_m):
+            high_m = 0.5 * (heights_m[slab] + heights_m[slab + 1]) + near_m
+        return low_m, high_m
+
+    def touched(self, path_enu_m: Path) -> frozenset[int]:
+        """Slabs in whose reach any of ``path_enu_m`` is."""
+        if not len(path_enu_m):
+            return frozenset()
+        lowest_m, highest_m = float(path_enu_m[:, 2].min()), float(path_enu_m[:, 2].max())
+        reaches_m = [self.reach_m(slab) for slab in range(len(self))]
+        return frozenset(
+            slab
+            for slab, (low_m, high_m) in enumerate(reaches_m)
+            if lowest_m < high_m and highest_m > low_m
+        )
+
+    def asked(self, path_enu_m: Path, *, grounded: bool = False) -> frozenset[int]:
+        """Slabs whose keepers are to be asked before ``path_enu_m`` is flown.
+
+        All that it touches, but for the one that a UAV leaves straight up or down from where it
+        hovers: the whole height of that slab above and below it is its own already.
+
+        Args:
+            path_enu_m: (k, 3) from where it is on [m].
+            grounded: it stands on the ground, and so has no air of its own yet.
+        """
+        touched = self.touched(path_enu_m)
+        if grounded or len(path_enu_m) < 2 or not is_upright(path_enu_m[:2]):
+            return touched if len(path_enu_m) > 1 or grounded else frozenset()
+        return self.touched(path_enu_m[1:]) | (touched - self.touched(path_enu_m[:1]))
+
+
+def is_upright(path_enu_m: Path) -> bool:
+    """Whether all of it is above one place."""
+    offset_m = path_enu_m[:, :2] - path_enu_m[:1, :2]
+    return bool((np.abs(offset_m) < 1e-6).all())
+
+
+def apart(
+    slabs: Slabs, one_enu_m: Path, other_enu_m: Path, within: frozenset[int] | None = None
+) -> bool:
+    """Whether two paths stay apart, whenever and however fast either is flown.
+
+    Args:
+        slabs: the air.
+        one_enu_m: (k, 3) corners [m].
+        other_enu_m: (l, 3) corners [m].
+        within: slabs that matter; None: all.
+    """
+    common = slabs.touched(one_enu_m) & slabs.touched(other_enu_m)
+    for slab in common if within is None else common & within:
+        low_m, high_m = slabs.reach_m(slab)
+        mine, its = _flat_pieces(one_enu_m, low_m, high_m), _flat_pieces(other_enu_m, low_m, high_m)
+        if len(mine) and len(its) and least_flat_m(mine, its) < slabs.separation_m:
+            return False
+    return True
+
+
+def least_flat_m(ones_m: FloatArray, others_m: FloatArray) -> float:
+    """Least distance of any of some straight pieces from any of others, seen from above [m].
+
+    Two pieces that do not cross are nearest at one of their four ends.
+
+    Args:
+        ones_m: (n, 2, 2) their beginnings and ends [m; east, north]; n > 0.
+        others_m: (m, 2, 2) alike; m > 0.
+    """
+    if _cross(ones_m, others_m):
+        return 0.0
+    near_m = [
+        _ends_from(ones_m, others_m),
+        _ends_from(others_m, ones_m),
+    ]
+    return float(min(near_m))
+
+
+def _flat_pieces(path_enu_m: Path, low_m: float, high_m: float) -> FloatArray:
+    """(n, 2, 2) what of a path is between two heights, seen from above [m]."""
+    begin, end = (
+        (path_enu_m, path_enu_m) if len(path_enu_m) == 1 else (path_enu_m[:-1], path_enu_m[1:])
+    )
+    rise_m = end[:, 2] - begin[:, 2]
+    level = np.abs(rise_m) < 1e-9
+    per_m = np.where(level, 0.0, 1.0 / np.where(level, 1.0, rise_m))
+    with np.errstate(invalid="ignore"):
+        at_low, at_high = (low_m - begin[:, 2]) * per_m, (high_m - begin[:, 2]) * per_m
+    at_low, at_high = np.where(level, -math.inf, at_low), np.where(level, math.inf, at_high)
+    first = np.clip(np.minimum(at_low, at_high), 0.0, 1.0)
+    last = np.clip(np.maximum(at_low, at_high), 0.0, 1.0)
+    inside = np.where(
+        level,
+        (begin[:, 2] > low_m) & (begin[:, 2] < high_m),
+        (np.minimum(begin[:, 2], end[:, 2]) < high_m)
+        & (np.maximum(begin[:, 2], end[:, 2]) > low_m),
+    )
+    way = end[:, :2] - begin[:, :2]
+    pieces = np.stack(
+        [begin[:, :2] + first[:, None] * way, begin[:, :2] + last[:, None] * way], axis=1
+    )
+    return pieces[inside]
+
+
+def _ends_from(ones_m: FloatArray, others_m: FloatArray) -> float:
+    """Least distance of any end of some pieces from others [m]."""
+    ends_m = ones_m.reshape(-1, 1, 2)
+    begin, way = others_m[:, 0], others_m[:, 1] - others_m[:, 0]
+    length2 = (way * way).sum(axis=1)
+    along = ((ends_m - begin) * way).sum(axis=2) / np.where(length2 > 0.0, length2, 1.0)
+    nearest = begin + np.clip(along, 0.0, 1.0)[:, :, None] * way
+    return float(np.sqrt(((ends_m - nearest) ** 2).sum(axis=2).min()))
+
+
+def _cross(ones_m: FloatArray, others_m: FloatArray) -> bool:
+    """Whether any of some pieces crosses any of others, both truly."""
+    a, b = ones_m[:, None, 0], ones_m[:, None, 1]
+    c, d = others_m[None, :, 0], others_m[None, :, 1]
+    over = _side(a, b, c) * _side(a, b, d) < 0.0
+    under = _side(c, d, a) * _side(c, d, b) < 0.0
+    return bool((over & under).any())
+
+
+def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
+    """On which side of the lines from ``a`` to ``b`` points are."""
+    turned: FloatArray = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (
+        b[..., 1] - a[..., 1]
+    ) * (c[..., 0] - a[..., 0])
+    return turned
+
+
+def start_layers(
+    slabs: Slabs, starts_enu_m: Sequence[tuple[float, float, float]], preferred: Sequence[int]
+) -> tuple[int, ...] | None:
+    """In which layer each UAV is airborne at mission time 0, all of them apart.
+
+    The first that is free, from the preferred one up and round; None: there are too few.
+
+    Args:
+        slabs: the air.
+        starts_enu_m: where they start, without a layer [m].
+        preferred: layer that suits each best.
+    """
+    chosen: list[int] = []
+    paths: list[Path] = []
+    for (east_m, north_m, up_m), first in zip(starts_enu_m, preferred, strict=True):
+        for step in range(len(slabs)):
+            layer = (first + step) % len(slabs)
+            path = np.array([[east_m, north_m, up_m + slabs.layers_m[layer]]])
+            if all(apart(slabs, path, other) for other in paths):
+                chosen.append(layer)
+                paths.append(path)
+                break
+        else:
+            return None
+    return tuple(chosen)
+
+
+def keeper_rows(n_slab: int, n_uav: int) -> tuple[int, ...]:
+    """By slab, the UAV that keeps it first; neighbouring slabs where one keeps several."""
+    if n_uav >= n_slab:
+        return tuple(range(n_slab))
+    return tuple(slab * n_uav // n_slab for slab in range(n_slab))
