@@ -22,9 +22,9 @@ from coordinator.sorties import SortieItems, sorties_of
 from swarm.model import Mission, Origin, Plan, Zone, ZoneId
 from swarm.model.fence_rings import blocks_all_heights, fence_rings
 from swarm.model.frames import wgs84_from_enu
-from swarm.model.layers import layers_over
 from swarm.runtime.errors import Fault, InputError
 from swarm.scenario.task_files.plan_file import LAYER_KEY
+from swarm.separation.fleet_layers import fleet_layers_m
 
 _QUADROTOR = 2
 _RELATIVE = 1
@@ -44,6 +44,7 @@ _HEEDED = frozenset(
         "zone",
         "band_m",
         "terrain",
+        "separation_m",
     }
 )
 """What a mission may ask for, by the keys of a scenario."""
@@ -104,13 +105,13 @@ def write_plans(folder: Path, mission: Mission, plan: Plan, firmware: ExportFirm
     """
     origin = require_origin(mission, mission.name)
     folder.mkdir(parents=True, exist_ok=True)
-    layers = layers_over(mission.terrain)
+    layers_m = fleet_layers_m(mission)
     written: list[Path] = []
     unfenced: dict[ZoneId, None] = {}
     for index, uav in enumerate(mission.uavs):
         sorties = sorties_of(mission, plan, uav)
         for number, sortie in enumerate(sorties, start=1):
-            items = SortieItems(sortie, uav, layers.layer_m(index), origin, mission.terrain)
+            items = SortieItems(sortie, uav, layers_m[index], origin, mission.terrain)
             zones = [zone for zone in mission.zones if not _blocks(zone, items)]
             unfenced |= dict.fromkeys(zone.id for zone in zones)
             document = sortie_plan(items, mission.zones, firmware)

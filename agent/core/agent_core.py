@@ -171,6 +171,7 @@ class AgentCore(AgentPart):
             now_s: now, on this process's own clock [s]; never decreases.
         """
         self._mission_view.now_s = now_s
+        event = self._airway.hear(event)
         if isinstance(event, Telemetry) and self._is_place_alone(now_s):
             self._mission_view.move(event)
             if not self._tasking.measure(now_s):
@@ -204,6 +205,7 @@ class AgentCore(AgentPart):
             self._peers.membership.next_deadline_s(),
             self._announcer.next_deadline_s(),
             self._tasking.next_deadline_s(),
+            self._airway.next_deadline_s(),
             self._ending.next_deadline_s() if self._knows_enough else None,
             self._queries.next_deadline_s(),
             self._recovered.next_deadline_s() if self._is_beginning else None,
@@ -468,8 +470,18 @@ class AgentCore(AgentPart):
             known = tuple(zone.zone() for zone in zones)
             actions.insert(0, OrderVehicle(KeepOut(known, brief.zone_margin_m)))
 
+    def _settle(self, now_s: float) -> None:
+        """Ask for ways, grant those of others, and set off on what is granted."""
+        for refused in self._airway.settle(now_s):
+            self._commander.hear(refused, now_s)
+            self._airway.settle(now_s)
+        if (restated := self._airway.restated()) is not None:
+            self._say(restated)
+
     def _end_step(self, now_s: float) -> list[Action]:
         """What came of the step; a change worth it is kept for a later life."""
+        if self._machine.acts:
+            self._settle(now_s)
         actions = self._actions.copy()
         self._actions.clear()
         self._tell_zones(actions)

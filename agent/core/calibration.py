@@ -233,6 +233,11 @@ class FlightMeter(AgentPart):
         if climb_s >= self.rates.climb_s:
             self._vote(self._medians.climbs, climb_s + STEP_S, _VERTICAL_RANGE, now_s)
 
+    def depart_late(self) -> None:
+        """The leg that was told last begins only now: its way was taken until then."""
+        if self._departure is not None:
+            self._departure = replace(self._departure, at_s=self._mission_view.now_s)
+
     def arrive(self, leg: int, now_s: float) -> bool:
         """It is where that leg ends; whether the battery is to be looked at anew."""
         if leg != self._leg:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
+from agent.core.airway import Airway
 from agent.core.announcer import Announcer
-from agent.core.interface import Action, OrderVehicle, VehicleOrder
+from agent.core.interface import Action, VehicleOrder
 from agent.core.mission_view import MissionView, Peers
 from agent.core.states import AgentStateMachine
 from agent.core.verticals import Verticals
@@ -14,6 +15,7 @@ from swarm.protocol.events import LogLine
 from swarm.protocol.messages import Body
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
+from swarm.protocol.uav_messages import Claim
 
 if TYPE_CHECKING:
     from agent.core.field_decision import FieldRuleMaker
@@ -40,6 +42,12 @@ class AgentContext:
     """How its vehicle lands and climbs; None where that takes no time."""
     actions: list[Action] = field(default_factory=list)
     """What has come of the step so far, in order."""
+    airway: Airway = field(init=False)
+    """Lets the vehicle go where it meets nobody of its fleet."""
+
+    def __post_init__(self) -> None:
+        own = self.uav, self.timing, self.replica, self.mission_view, self.peers, self.actions
+        object.__setattr__(self, "airway", Airway(*own))
 
 
 class AgentPart:
@@ -55,13 +63,16 @@ class AgentPart:
         self._machine = context.machine
         self._make_field_rule = context.make_field_rule
         self._actions = context.actions
+        self._airway = context.airway
 
     def _say(self, body: Body) -> None:
         """State the new content of an own register, or what is none: status and choice."""
-        self._actions.append(self._announcer.say(body))
+        said = self._airway.told(body) if isinstance(body, Claim) else body
+        self._actions.append(self._announcer.say(said))
 
     def _log(self, text: str, **fields: object) -> None:
         self._actions.append(LogLine(text, fields))
 
-    def _order(self, order: VehicleOrder) -> None:
-        self._actions.append(OrderVehicle(order))
+    def _order(self, order: VehicleOrder, *, own_height: bool = False, fixed: bool = False) -> None:
+        """Let the vehicle obey; `Airway.order` says what the rest means."""
+        self._airway.order(order, own_height=own_height, fixed=fixed)

@@ -56,6 +56,7 @@ class Flights(AgentPart):
         """Number of the last order to fly somewhere; what the vehicle says of others is late."""
         self.meter = FlightMeter(context)
         """Is told of every leg."""
+        context.airway.when_departed = self.meter.depart_late
         self._zones: tuple[ZoneSpec, ...] = ()
         self._home: HomeFlight | None = None
         self._home_from: object = None
@@ -289,7 +290,8 @@ class Flights(AgentPart):
         self.meter.depart(self.leg, self._straight_s(task.position_enu_m))
         place_enu_m = self._mission_view.in_layer(task.position_enu_m)
         self._mission_view.set_off()
-        self._order(GoTo(self.leg, place_enu_m, task.service_s, idled, task.task, attempt))
+        goes = GoTo(self.leg, place_enu_m, task.service_s, idled, task.task, attempt)
+        self._order(goes)
 
     def along(
         self,
@@ -308,9 +310,8 @@ class Flights(AgentPart):
         name = None if task is None else task.task
         via_enu_m = way.via_enu_m
         trigger_m = None if task is None or task.trigger_m is None else 0.0  # along the line only
-        self._order(
-            GoTo(self.leg, way.end_enu_m, stay_s, idled, name, attempt, via_enu_m, trigger_m)
-        )
+        goes = GoTo(self.leg, way.end_enu_m, stay_s, idled, name, attempt, via_enu_m, trigger_m)
+        self._order(goes, own_height=task is not None and task.height_m is not None)
 
     def along_line(self, task: TaskEntry, attempt: int, *, backwards: bool) -> Point:
         """Fly the line of a task from end to end; gives where that is, without the layer."""
@@ -321,7 +322,9 @@ class Flights(AgentPart):
         self.meter.depart(self.leg, line_s / self._time_frac())
         via_enu_m, stay_s = tuple(flown[1:-1]), task.service_s
         name, trigger_m = task.task, task.trigger_m
-        self._order(GoTo(self.leg, flown[-1], stay_s, False, name, attempt, via_enu_m, trigger_m))
+        own_height = task.height_m is not None
+        goes = GoTo(self.leg, flown[-1], stay_s, False, name, attempt, via_enu_m, trigger_m)
+        self._order(goes, own_height=own_height, fixed=own_height)
         return points[-1]
 
     def _time_frac(self) -> float:

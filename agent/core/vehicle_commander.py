@@ -167,6 +167,8 @@ class VehicleCommander(AgentPart):
         """What the last claim of an earlier life, if there was one, tells of the vehicle."""
         self._flew_before = claim is not None
         self._left_in_air = claim is not None and claim.phase in _ALOFT and not rejoin
+        if claim is not None:
+            self._airway.recall(claim)
 
     def stay_out(self, claim: Claim, now_s: float) -> None:
         """An earlier life took no more part, as it claimed: neither does this one."""

@@ -17,7 +17,7 @@ from coordinator.mission_view.missed import able_alone
 from swarm.model import Mission, Origin, Task, Uav
 from swarm.model.frames import DEFAULT_ORIGIN
 from swarm.model.ids import COORDINATOR
-from swarm.model.layers import FlightLayers, layers_over
+from swarm.model.layers import FlightLayers
 from swarm.protocol.board import TaskBoard, TaskState, is_of_field
 from swarm.protocol.encoding import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES, encode
 from swarm.protocol.events import LogLine, Publish
@@ -37,12 +37,13 @@ from swarm.protocol.messages import (
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
+from swarm.separation.fleet_layers import fleet_layers_m
 
 
 def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> MissionConfig:
     """What the agents need to know of ``mission``."""
     origin: Origin = mission.origin or DEFAULT_ORIGIN
-    flown = layers_over(mission.terrain, layers)
+    layers_m = fleet_layers_m(mission, layers)
     return MissionConfig(
         horizon_s=mission.horizon_s,
         success_default=mission.success_default,
@@ -58,18 +59,19 @@ def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> Missi
                 success=dict(uav.success),
                 survival=dict(uav.survival),
                 kind=uav.kind,
-                layer_m=flown.layer_m(index),
+                layer_m=layer_m,
                 acceleration_m_s2=uav.acceleration_m_s2,
                 airspeed_m_s=uav.airspeed_m_s,
                 endurance_s=uav.endurance_s,
                 **_shares_of(uav),
             )
-            for index, uav in enumerate(mission.uavs)
+            for uav, layer_m in zip(mission.uavs, layers_m, strict=True)
         ),
         bases=tuple(map(BaseSpec.of, mission.bases)),
         zones=tuple(map(ZoneSpec.of, mission.zones)),
         wind_enu_m_s=mission.wind_enu_m_s,
         zone_margin_m=mission.zone_margin_m,
+        separation_m=mission.separation_m,
         band_m=mission.band_m,
         areas=tuple(map(AreaSpec.of, mission.areas)),
         terrain=None if mission.terrain is None else TerrainSpec.of(mission.terrain),

@@ -192,6 +192,9 @@ class Mission:
     """Steady wind by where it blows to [m/s; east, north]."""
     zone_margin_m: float = 0.0
     """Paths stay that far away from zones [m]; >= 0."""
+    separation_m: float | None = None
+    """Smallest distance of two UAVs in flight [m]; > 0. None: nothing keeps them apart but their
+    layers."""
     band_m: tuple[float, float] | None = None
     """Heights above the ground that may be used [m]; None: each UAV in its own layer."""
     areas: tuple[Area, ...] = ()
@@ -230,6 +233,10 @@ class Mission:
                 )
         if not (math.isfinite(self.zone_margin_m) and self.zone_margin_m >= 0.0):
             raise ValueError(f"zone_margin_m must be >= 0, not {self.zone_margin_m}")
+        if self.separation_m is not None and not 0.0 < self.separation_m < math.inf:
+            raise ValueError(f"separation_m must be > 0, not {self.separation_m}")
+        if self.separation_m is not None and self.terrain is not None:
+            raise ValueError("separation_m is not known beside a terrain")
         if self.band_m is not None and not 0.0 <= self.band_m[0] < self.band_m[1] < math.inf:
             raise ValueError(f"band_m must be two growing heights >= 0, not {self.band_m}")
         if self.band_m is not None and self.terrain is not None:
@@ -253,6 +260,7 @@ class Mission:
             "wind_m_s": any(self.wind_enu_m_s),
             "base": self.bases,
             "zone": self.zones,
+            "separation_m": self.separation_m is not None,
             "band_m": self.band_m is not None,
             "terrain": self.terrain is not None,
         }

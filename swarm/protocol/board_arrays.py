@@ -133,6 +133,7 @@ def mission_with(
         zones=tuple(zone.zone() for zone in zones),
         wind_enu_m_s=brief.wind_enu_m_s,
         zone_margin_m=brief.zone_margin_m,
+        separation_m=brief.separation_m,
         band_m=brief.band_m,
         areas=tuple(area.area() for area in brief.areas),
         terrain=None if brief.terrain is None else brief.terrain.terrain(),

@@ -50,6 +50,7 @@ from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import (
     FIELD_VERSION,
     SCHEMA_VERSION,
+    SEPARATION_VERSION,
     TERRAIN_VERSION,
     Body,
     Message,
@@ -82,7 +83,7 @@ IN_SEALED_ANSWER: Final = 64
 """Arrays and maps of an answer in which all registers but the roster are envelopes."""
 SIGNED_HERE: Final = "signed, but no keys here"
 UNKNOWN_VERSION: Final = "unknown version"
-_VERSIONS: Final = (SCHEMA_VERSION, FIELD_VERSION, TERRAIN_VERSION)
+_VERSIONS: Final = (SCHEMA_VERSION, FIELD_VERSION, TERRAIN_VERSION, SEPARATION_VERSION)
 
 WIRE_DEFAULTS: Final[Mapping[str, Mapping[str, object]]] = {}
 """By kind, what a field means that an older release does not say; of fields that were added

@@ -27,6 +27,7 @@ from swarm.protocol.field_messages import (
 from swarm.protocol.messages import (
     FIELD_VERSION,
     SCHEMA_VERSION,
+    SEPARATION_VERSION,
     TERRAIN_VERSION,
     Body,
     Message,
@@ -47,6 +48,7 @@ from swarm.protocol.uav_messages import (
     Choice,
     ChoiceBasis,
     Claim,
+    ClaimedWay,
     Outcome,
     Status,
 )
@@ -84,13 +86,14 @@ FIELDS: Final[dict[type, tuple[str, ...]]] = {
         TerrainSpec,
         ChoiceBasis,
         Candidate,
+        ClaimedWay,
     )
 }
 """Of everything that a message is made of."""
 _OF_TASKS: Final = frozenset(
     {"due_s", "opens_s", "closes_s", "path_enu_m", "height_m", "trigger_m"}
 )
-_OF_CLAIMS: Final = ("base", "stage", "arrives_s", "sortie_end_s", "reversed", "departs_s")
+_OF_CLAIMS: Final = ("base", "stage", "arrives_s", "sortie_end_s", "reversed", "departs_s", "way")
 _OF_UAVS: Final = ("airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
 _OF_BRIEFS: Final = (
     "bases",
@@ -100,6 +103,7 @@ _OF_BRIEFS: Final = (
     "band_m",
     "areas",
     "terrain",
+    "separation_m",
 )
 SINCE_FIELD: Final[dict[type, frozenset[str]]] = {
     UavSpec: frozenset({"acceleration_m_s2", *_OF_UAVS}),
@@ -210,8 +214,11 @@ def _message_bytes(message: Message) -> bytes:
 
 def _version_of(body: Body) -> int:
     """Which releases must understand what has more in it than the first one did."""
-    over_ground = isinstance(body, MissionConfig) and body.terrain is not None
-    return TERRAIN_VERSION if over_ground else FIELD_VERSION
+    if not isinstance(body, MissionConfig):
+        return FIELD_VERSION
+    if body.separation_m is not None:
+        return SEPARATION_VERSION
+    return FIELD_VERSION if body.terrain is None else TERRAIN_VERSION
 
 
 def _is_plain(part: object) -> bool:

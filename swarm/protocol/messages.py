@@ -42,6 +42,7 @@ from swarm.protocol.fields import (
     Point,
     Probability,
     Reason,
+    Separation,
     Speed,
     Value,
     WindSpeed,
@@ -56,6 +57,8 @@ FIELD_VERSION = 2
 """Of statements that tell of what the field asks for, which releases before must not pass over."""
 TERRAIN_VERSION = 3
 """Of briefs with a ground: who knows nothing of it would fly into it."""
+SEPARATION_VERSION = 4
+"""Of briefs with a separation: who knows nothing of it would keep to no distance."""
 LONGEST_ROSTER = 1 << 20
 """Characters of a signed roster."""
 
@@ -127,6 +130,9 @@ class MissionConfig(Checked):
     terrain: TerrainSpec | None = None
     """The ground, on which all places lie, and above which heights of tasks count; None: it is
     flat, and nobody looks at it."""
+    separation_m: Separation | None = None
+    """Smallest distance of two UAVs in flight [m]; None: nothing but their layers keeps them
+    apart."""
 
     def __post_init__(self) -> None:
         Origin(*self.origin)
@@ -144,6 +150,8 @@ class MissionConfig(Checked):
             raise ValueError(f"band_m must be two growing heights, not {self.band_m}")
         if self.band_m is not None and self.terrain is not None:
             raise ValueError("band_m is not known beside a terrain")
+        if self.separation_m is not None and self.terrain is not None:
+            raise ValueError("separation_m is not known beside a terrain")
 
 
 class MissionPhase(StrEnum):

@@ -8,7 +8,7 @@ and compare.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Annotated
 
@@ -149,6 +149,29 @@ class BaseStage(StrEnum):
     """On the ground, but off the slots."""
 
 
+MOST_CORNERS = 100
+"""Of the way that a claim tells."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClaimedWay(Checked):
+    """What air a UAV takes or asks for, where UAVs are to be kept apart; see swarm.separation."""
+
+    number: Count
+    """Of the request, greater than in any earlier one of this UAV."""
+    path_enu_m: Annotated[tuple[Point, ...], Len(0, MOST_CORNERS)] = ()
+    """From where it hovers to where it is going to [m; mission origin, height included]; one
+    point: it stays there. None: it stands on the ground."""
+    flies: Flag = False
+    """Whether all who keep that air have granted it; else it waits where the path begins."""
+    grounded: Flag = False
+    """Whether it stands on the ground as long as it does not fly."""
+    shift_m: Metres = 0.0
+    """How much higher its layer is on that path than the brief's."""
+    grants: Mapping[Id, Count] = field(default_factory=dict)
+    """What it has granted as a keeper of air: by UAV the number of its request."""
+
+
 @dataclass(frozen=True, slots=True)
 class Claim(Checked):
     """Register ``uav/<id>/claim``: the task or base, or both, that a UAV has taken."""
@@ -175,6 +198,9 @@ class Claim(Checked):
     """The task, a line, is flown from its last point to its first; None of a place."""
     departs_s: Instant | None = None
     """Mission time until which it waits at the base before it flies to the task [s]."""
+
+    way: ClaimedWay | None = None
+    """None where UAVs are not kept apart by what they claim."""
 
     def __post_init__(self) -> None:
         if self.handed_over and self.phase is not ClaimPhase.OUT:

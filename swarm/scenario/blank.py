@@ -73,8 +73,10 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "wind_m_s": "Steady wind by where it blows to [m/s east, m/s north]; UAVs with an "
         "airspeed_m_s feel it. Absent: calm.",
         "zone_margin_m": "Paths stay that far away from zones [m].",
-        "band_m": "Lowest and highest height above the ground that may be used [m]. Absent: each "
-        "UAV flies in a layer of its own.",
+        "separation_m": "Smallest distance of two UAVs in flight [m]. Absent: each keeps to a "
+        "height of its own, 3 m from the next one's, and nothing else keeps them apart.",
+        "band_m": "Lowest and highest height above the ground that may be used [m]; with a "
+        "separation_m all UAVs share the layers in it. Absent: each flies in a layer of its own.",
     },
     "origin": {
         "lat_deg": "Latitude and longitude (WGS84) of the place where position_m is [0, 0] [deg]. "
@@ -194,6 +196,7 @@ _EXAMPLES: Mapping[tuple[str, str], str] = {
     ("", "tasks_from"): '"survey.plan"',
     ("mission", "wind_m_s"): "[3.0, -1.0]",
     ("mission", "zone_margin_m"): "5.0",
+    ("mission", "separation_m"): "10.0",
     ("mission", "band_m"): "[30.0, 110.0]",
     ("uav", "lat_deg"): "47.397742",
     ("uav", "lon_deg"): "8.545594",

@@ -59,6 +59,7 @@ def mission_of(scenario: Scenario) -> Mission:
         zones=tuple(_zone(zone, origin) for zone in scenario.zone),
         wind_enu_m_s=(east_m_s, north_m_s),
         zone_margin_m=rules.zone_margin_m,
+        separation_m=rules.separation_m,
         band_m=None if rules.band_m is None else (rules.band_m[0], rules.band_m[1]),
         areas=tuple(_area(area, origin) for area in scenario.area),
         schema=scenario.version,

@@ -1,4 +1,4 @@
-"""Which edition of the format a file speaks: the words of schema 2, and those of later ones.
+"""Which edition of the format a file speaks: the words of schema 2.
 
 Both editions have the same tables. A file of the first uses no word of the second, so that a
 release which knows the first alone reads it.
@@ -13,14 +13,13 @@ from swarm.scenario.findings import Document, Finding, Path
 EDITIONS = (1, 2)
 """Values of ``schema``."""
 NEW_KEYS: Mapping[str, Sequence[str]] = {
-    "mission": ("wind_m_s", "zone_margin_m", "band_m"),
+    "mission": ("wind_m_s", "zone_margin_m", "separation_m", "band_m"),
     "uav": ("acceleration_m_s2", "airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac"),
     "task": ("due_s", "opens_s", "closes_s", "path_m", "path", "trigger_m", "height_m"),
 }
 """What schema 2 adds to the tables of schema 1."""
 NEW_TABLES = ("base", "zone", "area", "terrain")
 """Tables of schema 2."""
-_LATER_KEYS: Mapping[str, Sequence[str]] = {"mission": ("separation_m",)}
 
 
 def edition_of(document: Document) -> int:
@@ -32,39 +31,14 @@ def edition_of(document: Document) -> int:
 
 
 def edition_faults(document: Document) -> Iterator[Finding]:
-    """Words of the second edition in a file of the first, and words that are not planned by yet."""
+    """Words of the second edition in a file of the first."""
     given = document.get("schema")
-    if given == 1 and not isinstance(given, bool):
-        used = [
-            *_used(document, NEW_TABLES, NEW_KEYS),
-            *_used(document, (), _LATER_KEYS),
-        ]
-        if words := list(dict.fromkeys(_word(path) for path in used)):
-            told = " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
-            verb = "are" if words[1:] else "is"
-            yield Finding(("schema",), f"is 1, and {told} {verb} of schema 2", "give schema = 2")
-    named: set[str] = set()
-    for path in _used(document, (), _LATER_KEYS):
-        if (word := _word(path)) not in named:
-            named.add(word)
-            yield Finding(path, f"this release does not plan by {word} yet", "leave it out")
-
-
-def without_later(document: Document) -> Document:
-    """``document`` without the words that are not planned by yet."""
-    kept = dict(document)
-    for table, keys in _LATER_KEYS.items():
-        if table in kept:
-            kept[table] = _without(kept[table], keys)
-    return kept
-
-
-def _without(value: object, keys: Sequence[str]) -> object:
-    if isinstance(value, list):
-        return [_without(entry, keys) for entry in value]
-    if isinstance(value, Mapping) and any(key in value for key in keys):
-        return {key: entry for key, entry in value.items() if key not in keys}
-    return value
+    if given != 1 or isinstance(given, bool):
+        return
+    if words := list(dict.fromkeys(map(_word, _used(document, NEW_TABLES, NEW_KEYS)))):
+        told = " and ".join([", ".join(words[:-1]), words[-1]] if words[1:] else words)
+        verb = "are" if words[1:] else "is"
+        yield Finding(("schema",), f"is 1, and {told} {verb} of schema 2", "give schema = 2")
 
 
 def _used(

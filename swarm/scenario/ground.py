@@ -34,6 +34,9 @@ def terrain_faults(document: Document) -> Iterator[Finding]:
     if isinstance(mission, Mapping) and "band_m" in mission:
         problem = "is not known beside [terrain]: every UAV keeps to its layer above the ground"
         yield Finding(("mission", "band_m"), problem, "leave it out")
+    if isinstance(mission, Mapping) and "separation_m" in mission:
+        problem = "is not known beside [terrain]: layers over hills are not shared yet"
+        yield Finding(("mission", "separation_m"), problem, "leave it out")
     for name in ("uav", "base", "task"):
         for index, entry in entries(document, name):
             if "alt_m" in entry:

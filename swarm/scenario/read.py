@@ -110,6 +110,8 @@ def build_mission(
             from swarm.scenario.area_faults import with_lines
 
             mission, findings = with_lines(mission)
+        if not findings and mission.separation_m is not None:
+            findings = _crowded_starts(mission)
         if not findings and (terrain := scenario.terrain) is not None:
             from swarm.scenario.ground import on_ground
 
@@ -122,6 +124,18 @@ def build_mission(
         there = [finding for finding in findings if _from_file(finding, first)]
         faults += _faults_of_file(tasks, there, first)
     raise InputError(*faults)
+
+
+def _crowded_starts(mission: Mission) -> list[Finding]:
+    """Starts so near to each other that the band has too few layers for them."""
+    from swarm.separation.fleet_layers import fleet_layers_m
+
+    try:
+        fleet_layers_m(mission)
+    except ValueError as error:
+        remedy = "spread the starts, or give a wider band_m or a smaller separation_m"
+        return [Finding(("mission", "separation_m"), str(error), remedy)]
+    return []
 
 
 def _with_entries(document: Document, tasks: TaskFile) -> tuple[Document, dict[str, int]]:

@@ -15,7 +15,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from swarm.model.ids import ID_RULE
-from swarm.scenario.edition import EDITIONS, edition_faults, without_later
+from swarm.scenario.edition import EDITIONS, edition_faults
 from swarm.scenario.findings import Document, Finding, close_match
 from swarm.scenario.validation import (
     PROBABILITY,
@@ -131,6 +131,7 @@ class MissionTable(StrictTable):
     reattempt_failed: bool = False
     wind_m_s: Annotated[list[_WindSpeed], AfterValidator(_require_wind)] | None = None
     zone_margin_m: Annotated[float, Field(ge=0.0, le=1e6)] = 0.0
+    separation_m: _Distance | None = None
     band_m: Annotated[list[_Height], AfterValidator(_require_band)] | None = None
 
 
@@ -308,6 +309,7 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("mission", "reattempt_failed"): "true or false",
     ("mission", "wind_m_s"): "[east, north], where the wind blows to, such as [3.0, -1.0] [m/s]",
     ("mission", "zone_margin_m"): "a distance >= 0 and <= 1e6 [m]",
+    ("mission", "separation_m"): "a distance within 0.1..1e6 [m], such as 10.0",
     ("mission", "band_m"): "[lowest, highest], heights >= 0 and <= 1e6 [m], such as [30.0, 110.0]",
     ("origin", "lat_deg"): "a latitude within -89..89 [deg]",
     ("origin", "lon_deg"): _LONGITUDE,
@@ -402,5 +404,5 @@ def validate_zones(document: Document) -> tuple[list[ZoneTable], list[Finding]]:
 
 def validate(document: Document) -> tuple[Scenario | None, list[Finding]]:
     """The scenario if every shape, type and range is right, and all findings otherwise."""
-    scenario, findings = validate_tables(Scenario, without_later(document), _TABLES, _RIGHT)
+    scenario, findings = validate_tables(Scenario, document, _TABLES, _RIGHT)
     return scenario, [*findings, *edition_faults(document)]

@@ -100,6 +100,7 @@ def _field_rules(mission: Mission) -> dict[str, object]:
     more = {
         "wind_m_s": list(mission.wind_enu_m_s) if any(mission.wind_enu_m_s) else None,
         "zone_margin_m": mission.zone_margin_m or None,
+        "separation_m": mission.separation_m,
         "band_m": None if mission.band_m is None else list(mission.band_m),
     }
     return {key: value for key, value in more.items() if value is not None}

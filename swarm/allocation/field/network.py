@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from swarm.model import Base, Mission, Task, Uav, Zone
 from swarm.model.layers import layers_over
+from swarm.separation.fleet_layers import slabs_of
 
 if TYPE_CHECKING:
     from swarm.allocation.legs import FlightModel, LegNetwork
@@ -77,6 +78,8 @@ class FieldNetwork:
             _layers_m(mission, uavs) if layers_m is None else list(map(float, layers_m))
         )
         self._band_m = mission.band_m
+        if self._band_m is None and (slabs := slabs_of(mission, min(self._layers_m))) is not None:
+            self._band_m = slabs.layers_m[0], slabs.layers_m[-1]
         zones = mission.zones
         self._ground: Ground | None = None
         if mission.terrain is not None:

@@ -1,0 +1,484 @@
+"""Lets one UAV's vehicle go only where nobody else of the fleet is or may be.
+
+In a mission with a separation all orders that move the vehicle come through here. One of them waits
+where the vehicle is, until the keepers of the air that its way leads through have granted it (see
+swarm.separation): in the UAV's layer, or in another one nearby if that is taken. The rest of the
+core knows nothing of other layers: it goes on in the one of the brief, and heights are shifted on
+their way to the vehicle and back. Whatever happens, the UAV may stay where it is.
+
+In any other mission orders pass as they are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from agent.core.interface import (
+    Action,
+    Arrived,
+    Event,
+    GoTo,
+    Held,
+    Hold,
+    Home,
+    Landed,
+    OrderVehicle,
+    Prepare,
+    Refused,
+    Return,
+    Telemetry,
+    VehicleOrder,
+    VehicleReady,
+)
+from agent.core.mission_view import MissionView, Peers
+from swarm.protocol.events import LogLine
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import MissionConfig
+from swarm.protocol.operator_commands import zones_in_force
+from swarm.protocol.registers import Replica
+from swarm.protocol.timing import Timing, earliest
+from swarm.protocol.uav_messages import MOST_CORNERS, Claim, ClaimedWay, ClaimPhase
+from swarm.separation.fleet_layers import air_of_brief
+from swarm.separation.shared_air import SharedAir, strength
+from swarm.separation.shifted import hover_shift_m, nominal, shifted_path
+
+STOP_LEG = 0
+"""Of orders that are this module's own; those of the core are numbered from 1."""
+GIVES_UP_S = 20.0
+"""How long a UAV waits for a way to a task before it looks for another task [s]."""
+LAST_RESORT_S = 300.0
+"""How long one that is to come home waits for a way before it comes without [s]."""
+ENDLESS_S = 1800.0
+"""How long the way of a lost UAV stays taken whose battery has no end [s]."""
+_ASIDE_M = (1.5, 3.0, 6.0, 12.0)
+"""How far somebody steps aside, in separations."""
+_DIRECTIONS = 8
+
+
+@dataclass(slots=True)
+class Wish:
+    """An order that waits for its way."""
+
+    order: GoTo | Return
+    since_s: float
+    corners_enu_m: tuple[Point, ...]
+    """In the own layer, from where the UAV is to where the order ends [m]."""
+    own_height: bool = False
+    """The height of its end is the task's."""
+    fixed: bool = False
+    """All of it is flown at the heights that it has."""
+    retry_at_s: float = -math.inf
+    asked: bool = False
+    """Whether the own claim asks for it."""
+    yielded: set[tuple[str, int]] = field(default_factory=set)
+    """Requests of others to which it has given way."""
+
+
+class Airway:
+    """The way of one UAV through the air that its fleet shares."""
+
+    def __init__(
+        self,
+        uav: str,
+        timing: Timing,
+        replica: Replica,
+        mission_view: MissionView,
+        peers: Peers,
+        actions: list[Action],
+    ) -> None:
+        self._uav = uav
+        self._retry_s = timing.patience_s
+        self._replica = replica
+        self._mission_view = mission_view
+        self._peers = peers
+        self._actions = actions
+        self.when_departed: Callable[[], None] = lambda: None
+        """Is told when the vehicle is sent off after a wait."""
+        self._brief: MissionConfig | None = None
+        self._air: SharedAir | None = None
+        self._way: ClaimedWay | None = None
+        self._aloft = False
+        self._moves = False
+        """Whether the vehicle may be anywhere on its way."""
+        self._stops = False
+        """Whether it has been told to stop, for the wish to be asked from there."""
+        self._own_height = False
+        """Whether its way ends at the height of a task."""
+        self._flown_leg = STOP_LEG
+        self._wish: Wish | None = None
+        self._aside: Wish | None = None
+        """It makes room, before its wish is asked again."""
+        self._granted: dict[str, int] = {}
+        self._lost_s: dict[str, float] = {}
+        """Who is lost, and since when [s mission time]."""
+        self._place: Point | None = None
+
+    # -- what the vehicle says -----------------------------------------------------------------
+
+    def hear(self, event: Event) -> Event:
+        """What the vehicle says, as the core is to hear it: in the layer of the brief."""
+        if self._shared is None:
+            return event
+        match event:
+            case Telemetry(position_enu_m=place):
+                self._place = place
+                return replace(event, position_enu_m=self._nominal(place))
+            case VehicleReady():
+                self._aloft = True
+            case Arrived(leg=leg) if leg == self._flown_leg and self._way is not None:
+                self._arrive(self._way)
+            case Held():
+                self._moves, self._stops = True, False  # it is somewhere on its way
+            case Landed() | Home():
+                self._aloft = self._moves = self._stops = False
+                self._way = replace(self._told_way, path_enu_m=(), flies=False, grounded=True)
+            case Refused(order=GoTo(leg=leg)) if leg == self._flown_leg:
+                self._moves = True
+            case _:
+                pass
+        return event
+
+    def recall(self, claim: Claim) -> None:
+        """An earlier life of this agent said so."""
+        way = claim.way
+        if self._way is not None or way is None:
+            return
+        self._granted = dict(way.grants)
+        self._aloft = bool(way.path_enu_m) and not (way.grounded and not way.flies)
+        self._moves = way.flies and self._aloft
+        if not way.flies and way.path_enu_m:
+            here = () if way.grounded else way.path_enu_m[:1]
+            way = replace(way, path_enu_m=here, shift_m=hover_shift_m(way), flies=bool(here))
+        self._way = way
+
+    # -- orders ----------------------------------------------------------------------------------
+
+    def order(self, order: VehicleOrder, *, own_height: bool = False, fixed: bool = False) -> None:
+        """Pass ``order`` on, at once or when there is a way.
+
+        Args:
+            order: to the vehicle, heights in the layer of the brief.
+            own_height: it ends at the height of a task.
+            fixed: all of it is flown at the heights that it has.
+        """
+        claimed = self._replica.claims.get(self._uav) is not None
+        if self._shared is None or not claimed or not isinstance(order, GoTo | Return):
+            self._actions.append(OrderVehicle(order))
+            if isinstance(order, Hold | Prepare) and self._shared is not None:
+                self._wish = self._aside = None
+                self._stops = False
+                if not self._told_way.flies:
+                    self._way = self._hover()
+            return
+        corners = self._corners(order)
+        if corners is None:
+            self._actions.append(OrderVehicle(order))
+            return
+        # Home, a vehicle goes down to its own layer above its start by itself.
+        own_height |= isinstance(order, Return) and not order.land
+        self._wish = Wish(order, self._mission_view.now_s, corners, own_height, fixed)
+        self._aside = None
+        if self._moves and not self._stops:
+            self._stop()
+
+    def _corners(self, order: GoTo | Return) -> tuple[Point, ...] | None:
+        """Of its way in the own layer; None: it leads nowhere."""
+        here = self._mission_view.here_enu_m
+        if here is None:
+            return None
+        if isinstance(order, GoTo):
+            return (here, *order.via_enu_m, order.position_enu_m)
+        if not self._aloft:
+            return None
+        me = self._mission_view.me
+        corners = [*order.path_enu_m, *([] if order.via_enu_m is None else [order.via_enu_m])]
+        if not order.land and me is not None:
+            corners.append(self._mission_view.in_layer(me.position_enu_m))
+        return (here, *corners)
+
+    def _stop(self) -> None:
+        """Stop where the vehicle was told to be last, which is on its way."""
+        if self._place is None:
+            return
+        self._stops, self._flown_leg = True, STOP_LEG
+        self._actions.append(OrderVehicle(GoTo(STOP_LEG, self._place)))
+
+    def _arrive(self, way: ClaimedWay) -> None:
+        self._moves = False
+        if self._stops and self._place is not None:
+            self._stops = False
+            east_m, north_m, up_m = self._place
+            shift_m = up_m - self._nominal(self._place)[2]
+            self._way = replace(way, path_enu_m=((east_m, north_m, up_m),), shift_m=shift_m)
+        elif way.path_enu_m:
+            shift_m = 0.0 if self._own_height else way.shift_m
+            self._way = replace(way, path_enu_m=way.path_enu_m[-1:], shift_m=shift_m)
+        self._own_height = False
+
+    # -- what it claims ----------------------------------------------------------------------------
+
+    def told(self, claim: Claim) -> Claim:
+        """``claim`` with the air that this UAV takes or asks for."""
+        if self._shared is None:
+            return claim
+        return replace(claim, way=replace(self._told_way, grants=dict(self._granted)))
+
+    def settle(self, now_s: float) -> list[Refused]:
+        """What follows from the claims: whom to grant, where to go, and what is told of it.
+
+        Returns:
+            Orders that are given up, since no way becomes free.
+        """
+        air, claim = self._shared, self._replica.claims.get(self._uav)
+        if air is None or claim is None:
+            return []
+        self._note_losses()
+        refused = self._press(air, now_s)
+        self._granted = air.granted(
+            self._uav, self._claims(), self._granted, self._heard(), self._expired()
+        )
+        self._depart_if_granted(air, now_s)
+        return refused
+
+    def restated(self) -> Claim | None:
+        """The own claim, if what is to be told of the air has changed since it was said."""
+        claim = self._replica.claims.get(self._uav)
+        if self._shared is None or claim is None:
+            return None
+        now = self.told(claim)
+        return None if now.way == claim.way else now
+
+    def next_deadline_s(self) -> float | None:
+        """When `settle` will next have something to do."""
+        wish = self._aside or self._wish
+        return None if wish is None or self._stops else earliest(wish.retry_at_s)
+
+    # -- asking -----------------------------------------------------------------------------------
+
+    def _press(self, air: SharedAir, now_s: float) -> list[Refused]:
+        """Ask for what is wished, give way to who is stronger, make room, or give up."""
+        if self._stops or self._moves:
+            return []
+        if self._aside is None:
+            self._make_room(air, now_s)
+        wish = self._aside or self._wish
+        if wish is None:
+            return []
+        waited_s = now_s - wish.since_s
+        if wish is self._wish and wish.asked and waited_s > GIVES_UP_S:
+            if isinstance(wish.order, GoTo) and wish.order.task is not None:
+                self._wish = None
+                self._way = self._hover()
+                return [Refused(wish.order, "no way there becomes free")]
+            if isinstance(wish.order, Return) and waited_s > LAST_RESORT_S:
+                self._actions.append(LogLine("comes home without a way of its own", {}))
+                self._depart(wish)
+                return []
+        rival = self._stronger(air, wish) if wish.asked else None
+        if rival is not None:
+            wish.yielded.add(rival)
+        if not wish.asked or rival is not None or wish.retry_at_s <= now_s:
+            wish.retry_at_s = now_s + self._retry_s
+            self._ask(air, wish, again=rival is not None)
+        return []
+
+    def _ask(self, air: SharedAir, wish: Wish, *, again: bool) -> None:
+        """Ask for the nearest layer in which nobody is in the way, else for one to wait for."""
+        claims, expired, here = self._claims(), self._expired(), self._hover()
+        fallback: ClaimedWay | None = None
+        for shift_m, corners in self._ways(air, wish):
+            start = here.path_enu_m[0] if here.path_enu_m else corners[0]
+            path = shifted_path(start, corners, shift_m, own_height=wish.own_height)
+            if len(path) > MOST_CORNERS:
+                continue
+            array = np.array(path)
+            grounded = not self._aloft
+            keepers = air.keepers(array, claims, expired, grounded=grounded)
+            if not all(keeper is not None and self._reaches(keeper) for keeper in keepers):
+                continue
+            asked = ClaimedWay(self._number(), path, False, grounded, shift_m)
+            if air.is_free(self._uav, array, claims, expired):
+                self._request(wish, asked)
+                return
+            fallback = fallback or asked
+        if wish is self._aside:
+            self._aside = None
+        elif fallback is not None and (again or not wish.asked):
+            self._request(wish, fallback)
+
+    def _request(self, wish: Wish, asked: ClaimedWay) -> None:
+        """Ask for that, unless it is asked for already, and nobody is to be let in before."""
+        current = self._told_way
+        same = (current.path_enu_m, current.shift_m) == (asked.path_enu_m, asked.shift_m)
+        if not (wish.asked and same) or wish.yielded:
+            wish.asked = True
+            self._way = asked
+
+    def _ways(self, air: SharedAir, wish: Wish) -> Iterator[tuple[float, tuple[Point, ...]]]:
+        """Shifts and corners of ways to what is wished, those that are nearest first."""
+        me, here = self._mission_view.me, self._hover()
+        if me is None:
+            return
+        shifts_m = [layer_m - me.layer_m for layer_m in air.slabs.layers_m]
+        shifts_m.sort(key=lambda shift_m: abs(shift_m - here.shift_m))
+        if wish.fixed:
+            shifts_m = [0.0]
+        if wish is not self._aside:
+            yield from ((shift_m, wish.corners_enu_m) for shift_m in shifts_m)
+            return
+        (east_m, north_m, up_m), *_ = wish.corners_enu_m
+        yield from (
+            (shift_m, wish.corners_enu_m[:1])
+            for shift_m in shifts_m
+            if abs(shift_m - here.shift_m) > 1e-6
+        )
+        if self._wish is not None or zones_in_force(self._replica):
+            return
+        for away in _ASIDE_M:
+            for turn in range(_DIRECTIONS):
+                angle, away_m = 2.0 * math.pi * turn / _DIRECTIONS, away * air.slabs.separation_m
+                there = east_m + away_m * math.cos(angle), north_m + away_m * math.sin(angle), up_m
+                for shift_m in shifts_m:
+                    yield shift_m, (wish.corners_enu_m[0], there)
+
+    def _stronger(self, air: SharedAir, wish: Wish) -> tuple[str, int] | None:
+        """Who asks for what meets this UAV's request, with more right, and not seen before."""
+        claims, mine = self._claims(), self._told_way
+        if mine.flies:
+            return None
+        path = air.wanted(self._uav, mine)
+        own = strength(self._uav, claims)
+        for uav in air.in_the_way(self._uav, path, claims, self._expired()):
+            asks = uav, air.way(uav, claims).number
+            if strength(uav, claims) < own and asks not in wish.yielded:
+                return asks
+        return None
+
+    def _make_room(self, air: SharedAir, now_s: float) -> None:
+        """Step aside for who asks for where this UAV hovers, unless it is at work."""
+        here = self._hover()
+        if self._moves or not self._aloft or not here.path_enu_m or not self._may_leave:
+            return
+        claims, place = self._claims(), np.array(here.path_enu_m)
+        for uav in air.in_the_way(self._uav, place, claims, self._expired()):
+            waits = self._wish is not None
+            if waits and strength(self._uav, claims) < strength(uav, claims):
+                continue
+            corner = self._nominal(here.path_enu_m[0])
+            order = GoTo(STOP_LEG, corner)
+            self._aside = Wish(order, now_s, (corner,))
+            if self._wish is not None:
+                self._wish.asked = False
+            return
+
+    @property
+    def _may_leave(self) -> bool:
+        """Whether it hovers for nothing but want of a task or of a way."""
+        claim = self._replica.claims.get(self._uav)
+        idle = claim is not None and claim.phase is ClaimPhase.IDLE
+        return idle or self._wish is not None
+
+    # -- setting off ------------------------------------------------------------------------------
+
+    def _depart_if_granted(self, air: SharedAir, now_s: float) -> None:
+        wish, way = self._aside or self._wish, self._told_way
+        if wish is None or not wish.asked or way.flies or self._stops:
+            return
+        if air.is_granted(self._uav, self._claims(), self._granted, self._expired()):
+            self._depart(wish)
+            if now_s > wish.since_s and wish is not self._aside:
+                self.when_departed()
+            if wish is self._aside:
+                self._aside = None
+            else:
+                self._wish = None
+
+    def _depart(self, wish: Wish) -> None:
+        """Send the vehicle along the way that is its own now."""
+        way, order = self._told_way, wish.order
+        path = way.path_enu_m
+        self._moves, self._aloft = len(path) > 1, True
+        self._own_height = wish.own_height
+        self._way = replace(way, flies=True, grounded=False)
+        if isinstance(order, GoTo):
+            self._flown_leg = order.leg
+            sent: GoTo | Return = replace(order, position_enu_m=path[-1], via_enu_m=path[1:-1])
+        else:
+            sent = replace(order, path_enu_m=path[1:-1], via_enu_m=path[-1])
+        self._actions.append(OrderVehicle(sent))
+
+    # -- pieces -----------------------------------------------------------------------------------
+
+    @property
+    def _shared(self) -> SharedAir | None:
+        """The air of the brief in force; None where nobody keeps apart."""
+        brief = self._replica.brief
+        if brief is not self._brief:
+            self._brief = brief
+            self._air = None if brief is None else air_of_brief(brief)
+        return self._air if self._mission_view.me is not None else None
+
+    @property
+    def _told_way(self) -> ClaimedWay:
+        if self._way is None:
+            me = self._mission_view.me
+            start = () if me is None else (self._mission_view.in_layer(me.position_enu_m),)
+            if not self._aloft:
+                start = ()
+            self._way = ClaimedWay(0, start, bool(start), not start)
+        return self._way
+
+    def _hover(self) -> ClaimedWay:
+        """Staying where its way begins, or where it is."""
+        way = self._told_way
+        if way.flies:
+            return replace(way, path_enu_m=way.path_enu_m[-1:])
+        here = () if way.grounded else way.path_enu_m[:1]
+        shift_m = 0.0 if way.grounded else hover_shift_m(way)
+        return replace(way, path_enu_m=here, flies=bool(here), grounded=not here, shift_m=shift_m)
+
+    def _number(self) -> int:
+        mission_ms = round(1e3 * self._mission_view.mission_s(self._mission_view.now_s))
+        return max(self._told_way.number + 1, mission_ms)
+
+    def _nominal(self, place: Point) -> Point:
+        return nominal(place, self._told_way, own_height=self._own_height)
+
+    def _claims(self) -> Mapping[str, Claim]:
+        """Of everyone, the own one as it is about to be said."""
+        claims = self._replica.claims
+        own = claims[self._uav]
+        return {**claims, self._uav: self.told(own)}
+
+    def _reaches(self, uav: str) -> bool:
+        return uav == self._uav or self._peers.membership.is_credible(uav)
+
+    def _heard(self) -> set[str]:
+        return {*self._peers.membership.present, self._uav}
+
+    def _note_losses(self) -> None:
+        present = self._peers.membership.present
+        mission_s = self._mission_view.mission_s(self._mission_view.now_s)
+        brief = self._brief
+        for uav in () if brief is None else brief.uavs:
+            if uav.id == self._uav or uav.id in present:
+                self._lost_s.pop(uav.id, None)
+            else:
+                self._lost_s.setdefault(uav.id, mission_s)
+
+    def _expired(self) -> set[str]:
+        """Who was lost so long ago that it can't be in the air any more."""
+        brief = self._brief
+        if not self._lost_s or brief is None:
+            return set()
+        mission_s = self._mission_view.mission_s(self._mission_view.now_s)
+        return {
+            uav.id
+            for uav in brief.uavs
+            if uav.id in self._lost_s
+            and mission_s - self._lost_s[uav.id] > (uav.endurance_s or ENDLESS_S)
+        }
