@@ -40,7 +40,7 @@ from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
-from swarm.protocol.timing import Timing, earliest
+from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import MOST_CORNERS, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.fleet_layers import air_of_brief
 from swarm.separation.shared_air import SharedAir, strength
@@ -115,6 +115,8 @@ class Airway:
         self._granted: dict[str, int] = {}
         self._lost_s: dict[str, float] = {}
         """Who is lost, and since when [s mission time]."""
+        self._room_at_s = -math.inf
+        """Not before does it look again whether it is in anybody's way."""
         self._place: Point | None = None
 
     # -- what the vehicle says -----------------------------------------------------------------
@@ -171,7 +173,7 @@ class Airway:
             if isinstance(order, Hold | Prepare) and self._shared is not None:
                 self._wish = self._aside = None
                 self._stops = False
-                if not self._told_way.flies:
+                if self._way is not None and not self._way.flies:
                     self._way = self._hover()
             return
         corners = self._corners(order)
@@ -255,7 +257,7 @@ class Airway:
     def next_deadline_s(self) -> float | None:
         """When `settle` will next have something to do."""
         wish = self._aside or self._wish
-        return None if wish is None or self._stops else earliest(wish.retry_at_s)
+        return None if wish is None or self._stops or self._moves else wish.retry_at_s
 
     # -- asking -----------------------------------------------------------------------------------
 
@@ -263,28 +265,35 @@ class Airway:
         """Ask for what is wished, give way to who is stronger, make room, or give up."""
         if self._stops or self._moves:
             return []
-        if self._aside is None:
+        if self._aside is None and self._room_at_s <= now_s:
+            self._room_at_s = now_s + self._retry_s
             self._make_room(air, now_s)
-        wish = self._aside or self._wish
-        if wish is None:
+        if self._aside is not None:
+            self._pursue(air, self._aside, now_s)
+        wish = self._wish
+        if wish is None or self._aside is not None:
             return []
         waited_s = now_s - wish.since_s
-        if wish is self._wish and wish.asked and waited_s > GIVES_UP_S:
+        if wish.asked and waited_s > GIVES_UP_S:
             if isinstance(wish.order, GoTo) and wish.order.task is not None:
                 self._wish = None
                 self._way = self._hover()
+                self._actions.append(LogLine("no way", {"task": wish.order.task}))
                 return [Refused(wish.order, "no way there becomes free")]
             if isinstance(wish.order, Return) and waited_s > LAST_RESORT_S:
                 self._actions.append(LogLine("comes home without a way of its own", {}))
                 self._depart(wish)
                 return []
+        self._pursue(air, wish, now_s)
+        return []
+
+    def _pursue(self, air: SharedAir, wish: Wish, now_s: float) -> None:
         rival = self._stronger(air, wish) if wish.asked else None
         if rival is not None:
             wish.yielded.add(rival)
         if not wish.asked or rival is not None or wish.retry_at_s <= now_s:
             wish.retry_at_s = now_s + self._retry_s
             self._ask(air, wish, again=rival is not None)
-        return []
 
     def _ask(self, air: SharedAir, wish: Wish, *, again: bool) -> None:
         """Ask for the nearest layer in which nobody is in the way, else for one to wait for."""
@@ -302,19 +311,19 @@ class Airway:
                 continue
             asked = ClaimedWay(self._number(), path, False, grounded, shift_m)
             if air.is_free(self._uav, array, claims, expired):
-                self._request(wish, asked)
+                self._request(wish, asked, again=again)
                 return
             fallback = fallback or asked
         if wish is self._aside:
             self._aside = None
         elif fallback is not None and (again or not wish.asked):
-            self._request(wish, fallback)
+            self._request(wish, fallback, again=again)
 
-    def _request(self, wish: Wish, asked: ClaimedWay) -> None:
+    def _request(self, wish: Wish, asked: ClaimedWay, *, again: bool) -> None:
         """Ask for that, unless it is asked for already, and nobody is to be let in before."""
         current = self._told_way
         same = (current.path_enu_m, current.shift_m) == (asked.path_enu_m, asked.shift_m)
-        if not (wish.asked and same) or wish.yielded:
+        if again or not (wish.asked and same):
             wish.asked = True
             self._way = asked
 
@@ -424,13 +433,12 @@ class Airway:
 
     @property
     def _told_way(self) -> ClaimedWay:
-        if self._way is None:
-            me = self._mission_view.me
-            start = () if me is None else (self._mission_view.in_layer(me.position_enu_m),)
-            if not self._aloft:
-                start = ()
-            self._way = ClaimedWay(0, start, bool(start), not start)
-        return self._way
+        if self._way is not None:
+            return self._way
+        me = self._mission_view.me
+        flies = self._aloft and me is not None
+        start = (self._mission_view.in_layer(me.position_enu_m),) if flies and me else ()
+        return ClaimedWay(0, start, flies, not flies)
 
     def _hover(self) -> ClaimedWay:
         """Staying where its way begins, or where it is."""

@@ -19,6 +19,7 @@ from sim.faults.invariants import TELEMETRY_GAP_S, InvariantChecker
 from sim.faults.message_log import Violation
 from sim.faults.planted_bugs import BUGS
 from sim.faults.schedule import Disturbance, DisturbanceKind, format_schedule, parse_schedule
+from sim.faults.separated_missions import random_separated_mission
 from sim.world.engine import EventQueue, LocalClock, stream
 from sim.world.motion import flown_s
 from sim.world.network import NetworkConditions, Topology
@@ -39,6 +40,8 @@ TIMING: Final = Timing(status_s=2.0)
 """The defaults, with a calmer status: nothing but the count of steps depends on it here."""
 FIRST_IN_FIELD: Final = 2_000_000
 """Of the seeds whose missions have all of the field's constraints."""
+FIRST_WITH_SEPARATION: Final = 3_000_000
+"""Of the seeds whose UAVs are to keep a distance as well."""
 CLOCK_PPM: Final = 100.0
 AREA_M: Final = 120.0
 KINDS_OF_TASK: Final = ("look", "lift")
@@ -80,8 +83,10 @@ class Case:
         if self.mission is not None:
             return self.mission
         if self.seed >= FIRST_IN_FIELD:
+            apart = self.seed >= FIRST_WITH_SEPARATION
+            draw = random_separated_mission if apart else random_field_mission
             most = MOST_UAVS, MOST_TASKS
-            return random_field_mission(self.seed, most, self.uavs, self.tasks, self.popups)
+            return draw(self.seed, most, self.uavs, self.tasks, self.popups)
         return _random_mission(self.seed, self.uavs, self.tasks, self.popups)
 
     def processes(self) -> tuple[str, ...]:

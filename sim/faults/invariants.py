@@ -17,6 +17,7 @@ Beside the invariants of the messages (sim.faults.message_log):
   that had begun, and came home of its own accord; or the operator added it too late, when the
   coordinator ended the mission;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
+- *too near*: no two UAVs in the air are nearer to each other than the mission's separation;
 - in the field those of `sim.faults.field_judge`, but for batteries of UAVs whose agents were no
   longer at work, or stopped by the operator; there a task is not lost that nobody could have done;
 - *miscounted*: the observer knows the visits of every UAV that left in calm, invents none, and
@@ -44,6 +45,7 @@ from sim.faults.drawn_zones import DrawnZone
 from sim.faults.field_judge import Chances, FieldJudge
 from sim.faults.injector import FaultInjector
 from sim.faults.message_log import MessageLog, Violation
+from sim.world.closest_approach import closest_approach
 from sim.world.engine import Process
 from sim.world.rough_network import RoughNetwork
 from sim.world.virtual_world import World
@@ -62,6 +64,8 @@ STEPS_AT_ONCE = 3000
 """More steps of all processes without time passing are a loop."""
 _LATE_S = 2.0
 """What is forgiven of windows: clocks jump, and words are late."""
+_NEAR_M = 1e-3
+"""What is forgiven of distances."""
 TELEMETRY_GAP_S = 0.2
 """Agents hear that often where their vehicles are."""
 _IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
@@ -156,6 +160,8 @@ class InvariantChecker:
         released = note.fields.get("task") if note.text == "released" else None
         if released is not None and not self._can_go_on(process, str(released)):
             self.message_log.gave_up(process.name, str(released))
+        if note.text == "no way" and "task" in note.fields:
+            self.message_log.refused(process.name, str(note.fields["task"]))
         if note.text == "turns aside":
             self.message_log.turned_aside(self._now_s, process.name, str(note.fields["task"]))
             self._stop_if_broken()
@@ -260,6 +266,7 @@ class InvariantChecker:
             self._look_at_the_count()
         if self.broken is None and is_field(self._world.mission):
             self._look_at_the_flights()
+            self._look_at_the_distances()
 
     def _look_for_the_missing(self) -> None:
         living = [(process, core) for process, core in self._living() if process.writer is not None]
@@ -363,6 +370,17 @@ class InvariantChecker:
             uav = text.partition(" ")[0]
             if not (invariant == "fell" and uav in self._injector.left_alone):
                 self._break(invariant, text)
+
+    def _look_at_the_distances(self) -> None:
+        asked_m = self._world.mission.separation_m
+        nearest = None if asked_m is None else closest_approach(self._world.tracks)
+        if nearest is not None and asked_m is not None and nearest.distance_m < asked_m - _NEAR_M:
+            one, other = nearest.uavs
+            text = (
+                f"{one} and {other} are {nearest.distance_m:.2f} m from each other at "
+                f"{nearest.at_s:.2f} s, not {asked_m:g} m"
+            )
+            self._break("too near", text)
 
     def _look_at_the_count(self) -> None:
         mission_state, true = self._world.mission_state, self.message_log.visits
