@@ -11,6 +11,7 @@ In any other mission orders pass as they are.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -41,22 +42,26 @@ from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
-from swarm.protocol.uav_messages import MOST_CORNERS, Claim, ClaimedWay, ClaimPhase
+from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.fleet_layers import air_of_brief
 from swarm.separation.shared_air import SharedAir, strength
 from swarm.separation.shifted import hover_shift_m, nominal, shifted_path
 
 STOP_LEG = 0
 """Of orders that are this module's own; those of the core are numbered from 1."""
-GIVES_UP_S = 20.0
+GIVES_UP_S = 10.0
 """How long a UAV waits for a way to a task before it looks for another task [s]."""
 LAST_RESORT_S = 300.0
 """How long one that is to come home waits for a way before it comes without [s]."""
+_OF_RESERVE = 0.5
+"""Share of the reserve that a wait for the way home may use up."""
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end [s]."""
 _ASIDE_M = (1.5, 3.0, 6.0, 12.0)
 """How far somebody steps aside, in separations."""
 _DIRECTIONS = 8
+_ASIDE_PATIENCE = 4.0
+"""How long it waits for its way aside, in intervals at which it asks anew."""
 
 
 @dataclass(slots=True)
@@ -98,6 +103,8 @@ class Airway:
         self._actions = actions
         self.when_departed: Callable[[], None] = lambda: None
         """Is told when the vehicle is sent off after a wait."""
+        self.sortie_end_s: Callable[[], float] = lambda: math.inf
+        """By when the UAV must have landed, its reserve kept [s mission time]."""
         self._brief: MissionConfig | None = None
         self._air: SharedAir | None = None
         self._way: ClaimedWay | None = None
@@ -113,6 +120,10 @@ class Airway:
         self._aside: Wish | None = None
         """It makes room, before its wish is asked again."""
         self._granted: dict[str, int] = {}
+        self._stands_at: tuple[str, BaseStage] | None = None
+        """Where it stands until its way up is granted."""
+        self._left_base = False
+        """Whether it has taken off from there since it last said anything."""
         self._lost_s: dict[str, float] = {}
         """Who is lost, and since when [s mission time]."""
         self._room_at_s = -math.inf
@@ -184,6 +195,8 @@ class Airway:
         own_height |= isinstance(order, Return) and not order.land
         self._wish = Wish(order, self._mission_view.now_s, corners, own_height, fixed)
         self._aside = None
+        if not self._aloft:
+            self._stands_at = self._stands_at or self._standing()
         if self._moves and not self._stops:
             self._stop()
 
@@ -227,7 +240,19 @@ class Airway:
         """``claim`` with the air that this UAV takes or asks for."""
         if self._shared is None:
             return claim
+        if self._stands_at is not None and claim.task is not None and claim.base is None:
+            base, stage = self._stands_at  # it holds its slot until it really takes off
+            departs_s = self._mission_view.mission_s(self._mission_view.now_s)
+            claim = replace(claim, base=base, stage=stage, departs_s=departs_s)
         return replace(claim, way=replace(self._told_way, grants=dict(self._granted)))
+
+    def _standing(self) -> tuple[str, BaseStage] | None:
+        """Base and stage of who stands there, by its own last word."""
+        claim = self._replica.claims.get(self._uav)
+        stands = claim is not None and claim.stage in (BaseStage.LANDED, BaseStage.PARKED)
+        return (
+            (claim.base, claim.stage) if stands and claim and claim.base and claim.stage else None
+        )
 
     def settle(self, now_s: float) -> list[Refused]:
         """What follows from the claims: whom to grant, where to go, and what is told of it.
@@ -251,8 +276,12 @@ class Airway:
         claim = self._replica.claims.get(self._uav)
         if self._shared is None or claim is None:
             return None
-        now = self.told(claim)
-        return None if now.way == claim.way else now
+        left = self._left_base and claim.task is not None and claim.departs_s is not None
+        now = self.told(replace(claim, base=None, stage=None, departs_s=None) if left else claim)
+        self._left_base = False
+        if now.way == claim.way and (now.base, now.stage) == (claim.base, claim.stage):
+            return None
+        return now
 
     def next_deadline_s(self) -> float | None:
         """When `settle` will next have something to do."""
@@ -269,20 +298,26 @@ class Airway:
             self._room_at_s = now_s + self._retry_s
             self._make_room(air, now_s)
         if self._aside is not None:
-            self._pursue(air, self._aside, now_s)
+            if now_s - self._aside.since_s > _ASIDE_PATIENCE * self._retry_s:
+                self._aside, self._way = None, self._hover()
+            else:
+                self._pursue(air, self._aside, now_s)
         wish = self._wish
         if wish is None or self._aside is not None:
             return []
         waited_s = now_s - wish.since_s
-        if wish.asked and waited_s > GIVES_UP_S:
-            if isinstance(wish.order, GoTo) and wish.order.task is not None:
+        if wish.asked:
+            works = isinstance(wish.order, GoTo) and wish.order.task is not None
+            mission_s = self._mission_view.mission_s(now_s)
+            if works and (waited_s > GIVES_UP_S or mission_s > self.sortie_end_s()):
                 self._wish = None
                 self._way = self._hover()
                 self._actions.append(LogLine("no way", {"task": wish.order.task}))
                 return [Refused(wish.order, "no way there becomes free")]
-            if isinstance(wish.order, Return) and waited_s > LAST_RESORT_S:
-                self._actions.append(LogLine("comes home without a way of its own", {}))
+            if not works and self._aloft and self._must_go(waited_s):
+                self._actions.append(LogLine("flies where it may meet others", {}))
                 self._depart(wish)
+                self._wish = None
                 return []
         self._pursue(air, wish, now_s)
         return []
@@ -310,7 +345,7 @@ class Airway:
             if not all(keeper is not None and self._reaches(keeper) for keeper in keepers):
                 continue
             asked = ClaimedWay(self._number(), path, False, grounded, shift_m)
-            if air.is_free(self._uav, array, claims, expired):
+            if air.is_free(self._uav, array, claims, expired, grounded=grounded):
                 self._request(wish, asked, again=again)
                 return
             fallback = fallback or asked
@@ -324,6 +359,8 @@ class Airway:
         current = self._told_way
         same = (current.path_enu_m, current.shift_m) == (asked.path_enu_m, asked.shift_m)
         if again or not (wish.asked and same):
+            if wish is self._aside and self._wish is not None:
+                self._wish.asked = False
             wish.asked = True
             self._way = asked
 
@@ -354,6 +391,17 @@ class Airway:
                 for shift_m in shifts_m:
                     yield shift_m, (wish.corners_enu_m[0], there)
 
+    def _must_go(self, waited_s: float) -> bool:
+        """Whether it would fall if it waited any longer: none of the reserve is left for that."""
+        me, end_s = self._mission_view.me, self.sortie_end_s()
+        if me is None or me.endurance_s is None or math.isinf(end_s):
+            return waited_s > LAST_RESORT_S
+        end_s += _OF_RESERVE * me.reserve_frac * me.endurance_s
+        path = self._told_way.path_enu_m
+        length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(path))
+        way_s = length_m / me.speed_m_s + self._retry_s
+        return self._mission_view.mission_s(self._mission_view.now_s) + way_s > end_s
+
     def _stronger(self, air: SharedAir, wish: Wish) -> tuple[str, int] | None:
         """Who asks for what meets this UAV's request, with more right, and not seen before."""
         claims, mine = self._claims(), self._told_way
@@ -380,8 +428,6 @@ class Airway:
             corner = self._nominal(here.path_enu_m[0])
             order = GoTo(STOP_LEG, corner)
             self._aside = Wish(order, now_s, (corner,))
-            if self._wish is not None:
-                self._wish.asked = False
             return
 
     @property
@@ -410,7 +456,8 @@ class Airway:
         """Send the vehicle along the way that is its own now."""
         way, order = self._told_way, wish.order
         path = way.path_enu_m
-        self._moves, self._aloft = len(path) > 1, True
+        self._left_base |= self._stands_at is not None
+        self._moves, self._aloft, self._stands_at = len(path) > 1, True, None
         self._own_height = wish.own_height
         self._way = replace(way, flies=True, grounded=False)
         if isinstance(order, GoTo):

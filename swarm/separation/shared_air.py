@@ -69,14 +69,32 @@ class SharedAir:
         return path[:0] if way.grounded else path[:1]
 
     def is_free(
-        self, uav: str, path: Path, claims: Mapping[str, Claim], expired: Collection[str]
+        self,
+        uav: str,
+        path: Path,
+        claims: Mapping[str, Claim],
+        expired: Collection[str],
+        *,
+        grounded: bool = False,
     ) -> bool:
         """Whether ``uav`` would meet nobody there, not even who only asks."""
-        return all(
-            apart(self.slabs, path, self.wanted(other, self.way(other, claims)))
-            for other in self._uavs
-            if other != uav and other not in expired
-        )
+        asked = self.slabs.asked(path, grounded=grounded)
+        for other in self._uavs:
+            if other == uav or other in expired:
+                continue
+            way = self.way(other, claims)
+            wanted = self.wanted(other, way)
+            if way.flies or grounded or not self._lets_by(path, wanted):
+                if not apart(self.slabs, path, wanted, asked):
+                    return False
+            elif not apart(self.slabs, path, self.taken(other, way, granted=False), asked):
+                return False
+        return True
+
+    def _lets_by(self, path: Path, wanted: Path) -> bool:
+        """Whether who hovers where ``path`` begins is in the way, and will not be at its end."""
+        here, there = path[:1], path[-1:]
+        return not apart(self.slabs, here, wanted) and apart(self.slabs, there, wanted)
 
     # -- who keeps it ----------------------------------------------------------------------
 
@@ -146,7 +164,7 @@ class SharedAir:
         """By UAV the request that ``keeper`` has granted, those of ``before`` among them.
 
         Requests are granted in the order of claims. One that would meet a stronger one waits for
-        it, though that waits as well.
+        it, though that waits as well; but not who leaves the place where it is in its way.
 
         Args:
             keeper: who grants.
@@ -169,7 +187,8 @@ class SharedAir:
             if uav not in heard or uav in expired or grants.get(uav) == way.number:
                 continue
             path = self.wanted(uav, way)
-            if not self.slabs.asked(path, grounded=way.grounded) & mine:
+            asked = self.slabs.asked(path, grounded=way.grounded) & mine
+            if not asked:
                 continue
             others = (
                 self.taken(other, its, granted=grants.get(other) == its.number)
@@ -177,7 +196,10 @@ class SharedAir:
                 if other != uav and other not in expired
                 for its in (self.way(other, claims),)
             )
-            if all(apart(self.slabs, path, other, mine) for other in (*waiting, *others)):
+            before_it = (
+                other for other in waiting if way.grounded or not self._lets_by(path, other)
+            )
+            if all(apart(self.slabs, path, other, asked) for other in (*before_it, *others)):
                 grants[uav] = way.number
             else:
                 waiting.append(path)
