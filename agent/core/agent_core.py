@@ -185,6 +185,8 @@ class AgentCore(AgentPart):
             self._handle(event, now_s)
             if not self._machine.has_ended:
                 self._advance(now_s)
+            if self._machine.acts:
+                self._settle(now_s)
             if self._machine.has_ended:
                 self._finish(now_s)
         return self._end_step(now_s)
@@ -480,8 +482,6 @@ class AgentCore(AgentPart):
 
     def _end_step(self, now_s: float) -> list[Action]:
         """What came of the step; a change worth it is kept for a later life."""
-        if self._machine.acts:
-            self._settle(now_s)
         actions = self._actions.copy()
         self._actions.clear()
         self._tell_zones(actions)

@@ -202,7 +202,7 @@ class Airway:
 
     def _corners(self, order: GoTo | Return) -> tuple[Point, ...] | None:
         """Of its way in the own layer; None: it leads nowhere."""
-        here = self._mission_view.here_enu_m
+        here = self._here()
         if here is None:
             return None
         if isinstance(order, GoTo):
@@ -214,6 +214,16 @@ class Airway:
         if not order.land and me is not None:
             corners.append(self._mission_view.in_layer(me.position_enu_m))
         return (here, *corners)
+
+    def _here(self) -> Point | None:
+        """Where the vehicle is, or will be in the air, in its own layer; None if not known."""
+        if not self._aloft:
+            place = self._mission_view.place_enu_m
+            return None if place is None else self._mission_view.in_layer(place)
+        path = self._told_way.path_enu_m
+        if not self._moves and path:
+            return self._nominal(path[-1] if self._told_way.flies else path[0])
+        return None if self._place is None else self._nominal(self._place)
 
     def _stop(self) -> None:
         """Stop where the vehicle was told to be last, which is on its way."""
@@ -240,10 +250,12 @@ class Airway:
         """``claim`` with the air that this UAV takes or asks for."""
         if self._shared is None:
             return claim
-        if self._stands_at is not None and claim.task is not None and claim.base is None:
+        if self._stands_at is not None and claim.base is None:
             base, stage = self._stands_at  # it holds its slot until it really takes off
-            departs_s = self._mission_view.mission_s(self._mission_view.now_s)
-            claim = replace(claim, base=base, stage=stage, departs_s=departs_s)
+            claim = replace(claim, base=base, stage=stage)
+            if claim.task is not None:
+                departs_s = self._mission_view.mission_s(self._mission_view.now_s)
+                claim = replace(claim, departs_s=departs_s)
         return replace(claim, way=replace(self._told_way, grants=dict(self._granted)))
 
     def _standing(self) -> tuple[str, BaseStage] | None:
@@ -306,7 +318,7 @@ class Airway:
         if wish is None or self._aside is not None:
             return []
         waited_s = now_s - wish.since_s
-        if wish.asked:
+        if wish.asked or waited_s > GIVES_UP_S:
             works = isinstance(wish.order, GoTo) and wish.order.task is not None
             mission_s = self._mission_view.mission_s(now_s)
             if works and (waited_s > GIVES_UP_S or mission_s > self.sortie_end_s()):

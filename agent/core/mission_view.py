@@ -216,15 +216,6 @@ class MissionView:
         return point[0], point[1], point[2] + self._layer_m
 
     @property
-    def here_enu_m(self) -> Point | None:
-        """Where it flies or is about to [m], in its own layer; None if not known."""
-        place_enu_m = self.place_enu_m
-        if place_enu_m is None:
-            return None
-        own_height = self._out_of_layer and not self.stands
-        return place_enu_m if own_height else self.in_layer(place_enu_m)
-
-    @property
     def flown_m(self) -> float | None:
         """Height at which it hovers out of its layer over the ground of the brief [m].
 
