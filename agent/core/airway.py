@@ -44,7 +44,7 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.fleet_layers import air_of_brief
-from swarm.separation.shared_air import SharedAir, strength
+from swarm.separation.shared_air import SharedAir, is_home, strength
 from swarm.separation.shifted import hover_shift_m, nominal, shifted_path
 
 STOP_LEG = 0
@@ -53,7 +53,7 @@ GIVES_UP_S = 10.0
 """How long a UAV waits for a way to a task before it looks for another task [s]."""
 LAST_RESORT_S = 300.0
 """How long one that is to come home waits for a way before it comes without [s]."""
-_OF_RESERVE = 0.5
+_OF_RESERVE = 0.25
 """Share of the reserve that a wait for the way home may use up."""
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end [s]."""
@@ -113,6 +113,8 @@ class Airway:
         """Whether the vehicle may be anywhere on its way."""
         self._stops = False
         """Whether it has been told to stop, for the wish to be asked from there."""
+        self._stop_enu_m: Point | None = None
+        """Where."""
         self._own_height = False
         """Whether its way ends at the height of a task."""
         self._flown_leg = STOP_LEG
@@ -122,6 +124,8 @@ class Airway:
         self._granted: dict[str, int] = {}
         self._stands_at: tuple[str, BaseStage] | None = None
         """Where it stands until its way up is granted."""
+        self._lifts_enu_m: Point | None = None
+        """Where it will be in the air that stands on the ground, in its own layer [m]."""
         self._left_base = False
         """Whether it has taken off from there since it last said anything."""
         self._lost_s: dict[str, float] = {}
@@ -148,7 +152,11 @@ class Airway:
                 self._moves, self._stops = True, False  # it is somewhere on its way
             case Landed() | Home():
                 self._aloft = self._moves = self._stops = False
-                self._way = replace(self._told_way, path_enu_m=(), flies=False, grounded=True)
+                self._lifts_enu_m = None
+                heir = self._heir() if isinstance(event, Home) else None
+                self._way = replace(
+                    self._told_way, path_enu_m=(), flies=False, grounded=True, heir=heir
+                )
             case Refused(order=GoTo(leg=leg)) if leg == self._flown_leg:
                 self._moves = True
             case _:
@@ -219,7 +227,10 @@ class Airway:
         """Where the vehicle is, or will be in the air, in its own layer; None if not known."""
         if not self._aloft:
             place = self._mission_view.place_enu_m
-            return None if place is None else self._mission_view.in_layer(place)
+            if self._lifts_enu_m is None and place is not None:
+                # What the vehicle tells from now on, still on the ground, is not in its layer.
+                self._lifts_enu_m = self._mission_view.in_layer(place)
+            return self._lifts_enu_m
         path = self._told_way.path_enu_m
         if not self._moves and path:
             return self._nominal(path[-1] if self._told_way.flies else path[0])
@@ -229,16 +240,15 @@ class Airway:
         """Stop where the vehicle was told to be last, which is on its way."""
         if self._place is None:
             return
-        self._stops, self._flown_leg = True, STOP_LEG
+        self._stops, self._flown_leg, self._stop_enu_m = True, STOP_LEG, self._place
         self._actions.append(OrderVehicle(GoTo(STOP_LEG, self._place)))
 
     def _arrive(self, way: ClaimedWay) -> None:
         self._moves = False
-        if self._stops and self._place is not None:
-            self._stops = False
-            east_m, north_m, up_m = self._place
-            shift_m = up_m - self._nominal(self._place)[2]
-            self._way = replace(way, path_enu_m=((east_m, north_m, up_m),), shift_m=shift_m)
+        if self._stops and self._stop_enu_m is not None:
+            self._stops, place = False, self._stop_enu_m
+            shift_m = place[2] - self._nominal(place)[2]
+            self._way = replace(way, path_enu_m=(place,), shift_m=shift_m)
         elif way.path_enu_m:
             shift_m = 0.0 if self._own_height else way.shift_m
             self._way = replace(way, path_enu_m=way.path_enu_m[-1:], shift_m=shift_m)
@@ -469,7 +479,8 @@ class Airway:
         way, order = self._told_way, wish.order
         path = way.path_enu_m
         self._left_base |= self._stands_at is not None
-        self._moves, self._aloft, self._stands_at = len(path) > 1, True, None
+        self._moves, self._aloft = len(path) > 1, True
+        self._stands_at = self._lifts_enu_m = None
         self._own_height = wish.own_height
         self._way = replace(way, flies=True, grounded=False)
         if isinstance(order, GoTo):
@@ -520,6 +531,18 @@ class Airway:
         claims = self._replica.claims
         own = claims[self._uav]
         return {**claims, self._uav: self.told(own)}
+
+    def _heir(self) -> str | None:
+        """Who is to keep this UAV's air: somebody who is heard, best one who takes part."""
+        brief, claims = self._brief, self._replica.claims
+        fleet = () if brief is None else brief.uavs
+        heard = [uav.id for uav in fleet if uav.id in self._peers.membership.credible]
+        by_part: dict[bool, list[str]] = {True: [], False: []}
+        for uav in heard:
+            claim = claims.get(uav)
+            if uav != self._uav and claim is not None and not is_home(claim):
+                by_part[claim.phase is not ClaimPhase.OUT].append(uav)
+        return next(iter((*by_part[True], *by_part[False])), None)
 
     def _reaches(self, uav: str) -> bool:
         return uav == self._uav or self._peers.membership.is_credible(uav)

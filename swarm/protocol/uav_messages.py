@@ -170,6 +170,8 @@ class ClaimedWay(Checked):
     """How much higher its layer is on that path than the brief's."""
     grants: Mapping[Id, Count] = field(default_factory=dict)
     """What it has granted as a keeper of air: by UAV the number of its request."""
+    heir: Id | None = None
+    """Who keeps its air from now on, as it is home for good."""
 
 
 @dataclass(frozen=True, slots=True)

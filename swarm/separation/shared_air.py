@@ -101,13 +101,30 @@ class SharedAir:
     def keeper(
         self, slab: int, claims: Mapping[str, Claim], expired: Collection[str]
     ) -> str | None:
-        """Who keeps ``slab``: the first, in the brief's order, that is not home for good."""
-        count = len(self._uavs)
-        for step in range(count):
-            uav = self._uavs[(self._first[slab] + step) % count]
-            if uav not in expired and not _is_home(claims.get(uav)):
-                return uav
-        return None
+        """Who keeps ``slab``; None: nobody is left in the air."""
+        return self._line(slab, claims, expired)[-1]
+
+    def _line(
+        self, slab: int, claims: Mapping[str, Claim], expired: Collection[str]
+    ) -> list[str | None]:
+        """All who have kept ``slab``, one after the other, up to who keeps it now.
+
+        Who is home for good has named an heir; of who has not, or can't be there any more, it is
+        the next one in the brief's order.
+        """
+        line: list[str | None] = []
+        uav = self._uavs[self._first[slab]]
+        while uav in expired or is_home(claims.get(uav)):
+            line.append(uav)
+            heir = self.way(uav, claims).heir
+            if heir is None or heir in line or heir not in self._unsaid:
+                after = self._uavs.index(uav)
+                order = [*self._uavs[after + 1 :], *self._uavs[:after]]
+                heir = next((each for each in order if each not in line), None)
+            if heir is None:
+                return [*line, None]
+            uav = heir
+        return [*line, uav]
 
     def keepers(
         self,
@@ -130,12 +147,10 @@ class SharedAir:
         """
         found = []
         for slab in range(len(self.slabs)):
-            if self.keeper(slab, claims, expired) != uav:
-                continue
-            first = self._first[slab]
-            before = (self._uavs.index(uav) - first) % len(self._uavs)
-            gone = [self._uavs[(first + step) % len(self._uavs)] for step in range(before)]
-            if all(self._is_settled(each, claims, expired) for each in gone):
+            *before, now = self._line(slab, claims, expired)
+            if now == uav and all(
+                each is None or self._is_settled(each, claims, expired) for each in before
+            ):
                 found.append(slab)
         return frozenset(found)
 
@@ -251,7 +266,7 @@ def strength(uav: str, claims: Mapping[str, Claim]) -> tuple[float, str]:
     return (0.0 if claim is None else claim.decided_s), uav
 
 
-def _is_home(claim: Claim | None) -> bool:
+def is_home(claim: Claim | None) -> bool:
     """Whether it takes no part any more, and stands on the ground."""
     return (
         claim is not None

@@ -16,7 +16,7 @@ from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import LARGE_LIMIT_BYTES, SMALL_LIMIT_BYTES, encode, encode_memory
 from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.messages import TERRAIN_VERSION, Message, MissionPhase, PlanEpoch, Snapshot
+from swarm.protocol.messages import SEPARATION_VERSION, Message, MissionPhase, PlanEpoch, Snapshot
 from swarm.protocol.uav_messages import MAX_CANDIDATES
 from tests.support.builders import MISSION, brief, choice, entry, epoch, message, uav
 from tests.support.message_strategies import messages
@@ -91,7 +91,7 @@ def test_a_fleet_of_a_thousand_fits_into_brief_epoch_and_choice() -> None:
 @pytest.mark.parametrize("said", EVERY_KIND, ids=EVERY_KIND_IDS)
 def test_another_schema_version_is_dropped_under_its_own_reason(said: Message) -> None:
     def newer(parts: Parts) -> None:
-        parts[0] = TERRAIN_VERSION + 1
+        parts[0] = SEPARATION_VERSION + 1
 
     assert reason_with(said, newer) == "unknown version"
 

@@ -17,7 +17,7 @@ from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import SNAPSHOT_LIMIT_BYTES, encode, fit
 from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.messages import TERRAIN_VERSION, Message, Snapshot
+from swarm.protocol.messages import SEPARATION_VERSION, Message, Snapshot
 from tests.support.builders import MISSION, brief, done, epoch, held, message, uav
 from tests.support.message_strategies import messages
 from tests.support.spoilt_messages import BOARD, BRIEF, CLAIM, OUTCOME, Parts, plain
@@ -159,7 +159,7 @@ def test_of_a_snapshot_too_large_there_stays_what_fits_the_own_first(
 
 def test_bad_registers_in_a_snapshot_are_left_out_and_the_others_kept() -> None:
     parts = snapshot_parts(CLAIM, OUTCOME, BOARD)
-    parts[5][0][0] = TERRAIN_VERSION + 1
+    parts[5][0][0] = SEPARATION_VERSION + 1
     parts[5][1][6]["completed_s"] = math.nan
     parts[5] += ["nonsense", None, [], parts[5][2][:5]]
     codec = Codec(MISSION)

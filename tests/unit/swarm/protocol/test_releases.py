@@ -14,7 +14,7 @@ from swarm.protocol import codec as wire
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import KINDS, SMALL_LIMIT_BYTES, encode
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.messages import TERRAIN_VERSION, Message, Snapshot
+from swarm.protocol.messages import SEPARATION_VERSION, Message, Snapshot
 from swarm.protocol.registers import Replica
 from swarm.protocol.sync import fingerprint
 from tests.support.builders import (
@@ -180,7 +180,7 @@ def test_what_a_newer_release_adds_counts_to_the_size() -> None:
     ("change", "reason"),
     [
         (lambda parts: parts.__setitem__(5, "formation"), "unknown kind"),
-        (lambda parts: parts.__setitem__(0, TERRAIN_VERSION + 1), "unknown version"),
+        (lambda parts: parts.__setitem__(0, SEPARATION_VERSION + 1), "unknown version"),
         (lambda parts: parts[6].update(phase="hovering"), "malformed"),
     ],
 )
