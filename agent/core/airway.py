@@ -13,11 +13,12 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
+from agent.core.fleet_air import FleetAir, Wish
 from agent.core.interface import (
     Action,
     Arrived,
@@ -38,13 +39,10 @@ from agent.core.interface import (
 from agent.core.mission_view import MissionView, Peers
 from swarm.protocol.events import LogLine
 from swarm.protocol.fields import Point
-from swarm.protocol.messages import MissionConfig
-from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
-from swarm.separation.fleet_layers import air_of_brief
-from swarm.separation.shared_air import SharedAir, is_home, strength
+from swarm.separation.shared_air import SharedAir, strength
 from swarm.separation.shifted import hover_shift_m, nominal, shifted_path
 
 STOP_LEG = 0
@@ -55,32 +53,8 @@ LAST_RESORT_S = 300.0
 """How long one that is to come home waits for a way before it comes without [s]."""
 _OF_RESERVE = 0.25
 """Share of the reserve that a wait for the way home may use up."""
-ENDLESS_S = 1800.0
-"""How long the way of a lost UAV stays taken whose battery has no end [s]."""
-_ASIDE_M = (1.5, 3.0, 6.0, 12.0)
-"""How far somebody steps aside, in separations."""
-_DIRECTIONS = 8
 _ASIDE_PATIENCE = 4.0
 """How long it waits for its way aside, in intervals at which it asks anew."""
-
-
-@dataclass(slots=True)
-class Wish:
-    """An order that waits for its way."""
-
-    order: GoTo | Return
-    since_s: float
-    corners_enu_m: tuple[Point, ...]
-    """In the own layer, from where the UAV is to where the order ends [m]."""
-    own_height: bool = False
-    """The height of its end is the task's."""
-    fixed: bool = False
-    """All of it is flown at the heights that it has."""
-    retry_at_s: float = -math.inf
-    asked: bool = False
-    """Whether the own claim asks for it."""
-    yielded: set[tuple[str, int]] = field(default_factory=set)
-    """Requests of others to which it has given way."""
 
 
 class Airway:
@@ -99,14 +73,12 @@ class Airway:
         self._retry_s = timing.patience_s
         self._replica = replica
         self._mission_view = mission_view
-        self._peers = peers
         self._actions = actions
         self.when_departed: Callable[[], None] = lambda: None
         """Is told when the vehicle is sent off after a wait."""
         self.sortie_end_s: Callable[[], float] = lambda: math.inf
         """By when the UAV must have landed, its reserve kept [s mission time]."""
-        self._brief: MissionConfig | None = None
-        self._air: SharedAir | None = None
+        self._fleet = FleetAir(uav, replica, mission_view, peers)
         self._way: ClaimedWay | None = None
         self._aloft = False
         self._moves = False
@@ -128,8 +100,6 @@ class Airway:
         """Where it will be in the air that stands on the ground, in its own layer [m]."""
         self._left_base = False
         """Whether it has taken off from there since it last said anything."""
-        self._lost_s: dict[str, float] = {}
-        """Who is lost, and since when [s mission time]."""
         self._room_at_s = -math.inf
         """Not before does it look again whether it is in anybody's way."""
         self._place: Point | None = None
@@ -153,7 +123,7 @@ class Airway:
             case Landed() | Home():
                 self._aloft = self._moves = self._stops = False
                 self._lifts_enu_m = None
-                heir = self._heir() if isinstance(event, Home) else None
+                heir = self._fleet.heir() if isinstance(event, Home) else None
                 self._way = replace(
                     self._told_way, path_enu_m=(), flies=False, grounded=True, heir=heir
                 )
@@ -285,10 +255,10 @@ class Airway:
         air, claim = self._shared, self._replica.claims.get(self._uav)
         if air is None or claim is None:
             return []
-        self._note_losses()
+        self._fleet.note_losses()
         refused = self._press(air, now_s)
         self._granted = air.granted(
-            self._uav, self._claims(), self._granted, self._heard(), self._expired()
+            self._uav, self._claims(), self._granted, self._fleet.heard(), self._fleet.expired()
         )
         self._depart_if_granted(air, now_s)
         return refused
@@ -336,8 +306,12 @@ class Airway:
                 self._way = self._hover()
                 self._actions.append(LogLine("no way", {"task": wish.order.task}))
                 return [Refused(wish.order, "no way there becomes free")]
-            if not works and self._aloft and self._must_go(waited_s):
+            if not works and self._aloft and self._must_go(wish, waited_s):
                 self._actions.append(LogLine("flies where it may meet others", {}))
+                here = self._hover()
+                start, shift_m = here.path_enu_m[0], here.shift_m
+                path = shifted_path(start, wish.corners_enu_m, shift_m, own_height=wish.own_height)
+                self._way = replace(here, number=self._number(), path_enu_m=path, flies=False)
                 self._depart(wish)
                 self._wish = None
                 return []
@@ -354,9 +328,11 @@ class Airway:
 
     def _ask(self, air: SharedAir, wish: Wish, *, again: bool) -> None:
         """Ask for the nearest layer in which nobody is in the way, else for one to wait for."""
-        claims, expired, here = self._claims(), self._expired(), self._hover()
+        claims, expired, here = self._claims(), self._fleet.expired(), self._hover()
         fallback: ClaimedWay | None = None
-        for shift_m, corners in self._ways(air, wish):
+        for shift_m, corners in self._fleet.ways(
+            air, wish, here.shift_m, aside=wish is self._aside, waits=self._wish is not None
+        ):
             start = here.path_enu_m[0] if here.path_enu_m else corners[0]
             path = shifted_path(start, corners, shift_m, own_height=wish.own_height)
             if len(path) > MOST_CORNERS:
@@ -364,7 +340,7 @@ class Airway:
             array = np.array(path)
             grounded = not self._aloft
             keepers = air.keepers(array, claims, expired, grounded=grounded)
-            if not all(keeper is not None and self._reaches(keeper) for keeper in keepers):
+            if not all(keeper is not None and self._fleet.reaches(keeper) for keeper in keepers):
                 continue
             asked = ClaimedWay(self._number(), path, False, grounded, shift_m)
             if air.is_free(self._uav, array, claims, expired, grounded=grounded):
@@ -386,41 +362,13 @@ class Airway:
             wish.asked = True
             self._way = asked
 
-    def _ways(self, air: SharedAir, wish: Wish) -> Iterator[tuple[float, tuple[Point, ...]]]:
-        """Shifts and corners of ways to what is wished, those that are nearest first."""
-        me, here = self._mission_view.me, self._hover()
-        if me is None:
-            return
-        shifts_m = [layer_m - me.layer_m for layer_m in air.slabs.layers_m]
-        shifts_m.sort(key=lambda shift_m: abs(shift_m - here.shift_m))
-        if wish.fixed:
-            shifts_m = [0.0]
-        if wish is not self._aside:
-            yield from ((shift_m, wish.corners_enu_m) for shift_m in shifts_m)
-            return
-        (east_m, north_m, up_m), *_ = wish.corners_enu_m
-        yield from (
-            (shift_m, wish.corners_enu_m[:1])
-            for shift_m in shifts_m
-            if abs(shift_m - here.shift_m) > 1e-6
-        )
-        if self._wish is not None or zones_in_force(self._replica):
-            return
-        for away in _ASIDE_M:
-            for turn in range(_DIRECTIONS):
-                angle, away_m = 2.0 * math.pi * turn / _DIRECTIONS, away * air.slabs.separation_m
-                there = east_m + away_m * math.cos(angle), north_m + away_m * math.sin(angle), up_m
-                for shift_m in shifts_m:
-                    yield shift_m, (wish.corners_enu_m[0], there)
-
-    def _must_go(self, waited_s: float) -> bool:
+    def _must_go(self, wish: Wish, waited_s: float) -> bool:
         """Whether it would fall if it waited any longer: none of the reserve is left for that."""
         me, end_s = self._mission_view.me, self.sortie_end_s()
         if me is None or me.endurance_s is None or math.isinf(end_s):
             return waited_s > LAST_RESORT_S
         end_s += _OF_RESERVE * me.reserve_frac * me.endurance_s
-        path = self._told_way.path_enu_m
-        length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(path))
+        length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(wish.corners_enu_m))
         way_s = length_m / me.speed_m_s + self._retry_s
         return self._mission_view.mission_s(self._mission_view.now_s) + way_s > end_s
 
@@ -431,7 +379,7 @@ class Airway:
             return None
         path = air.wanted(self._uav, mine)
         own = strength(self._uav, claims)
-        for uav in air.in_the_way(self._uav, path, claims, self._expired()):
+        for uav in air.in_the_way(self._uav, path, claims, self._fleet.expired()):
             asks = uav, air.way(uav, claims).number
             if strength(uav, claims) < own and asks not in wish.yielded:
                 return asks
@@ -443,7 +391,7 @@ class Airway:
         if self._moves or not self._aloft or not here.path_enu_m or not self._may_leave:
             return
         claims, place = self._claims(), np.array(here.path_enu_m)
-        for uav in air.in_the_way(self._uav, place, claims, self._expired()):
+        for uav in air.in_the_way(self._uav, place, claims, self._fleet.expired()):
             waits = self._wish is not None
             if waits and strength(self._uav, claims) < strength(uav, claims):
                 continue
@@ -465,7 +413,7 @@ class Airway:
         wish, way = self._aside or self._wish, self._told_way
         if wish is None or not wish.asked or way.flies or self._stops:
             return
-        if air.is_granted(self._uav, self._claims(), self._granted, self._expired()):
+        if air.is_granted(self._uav, self._claims(), self._granted, self._fleet.expired()):
             self._depart(wish)
             if now_s > wish.since_s and wish is not self._aside:
                 self.when_departed()
@@ -494,12 +442,7 @@ class Airway:
 
     @property
     def _shared(self) -> SharedAir | None:
-        """The air of the brief in force; None where nobody keeps apart."""
-        brief = self._replica.brief
-        if brief is not self._brief:
-            self._brief = brief
-            self._air = None if brief is None else air_of_brief(brief)
-        return self._air if self._mission_view.me is not None else None
+        return self._fleet.shared
 
     @property
     def _told_way(self) -> ClaimedWay:
@@ -531,44 +474,3 @@ class Airway:
         claims = self._replica.claims
         own = claims[self._uav]
         return {**claims, self._uav: self.told(own)}
-
-    def _heir(self) -> str | None:
-        """Who is to keep this UAV's air: somebody who is heard, best one who takes part."""
-        brief, claims = self._brief, self._replica.claims
-        fleet = () if brief is None else brief.uavs
-        heard = [uav.id for uav in fleet if uav.id in self._peers.membership.credible]
-        by_part: dict[bool, list[str]] = {True: [], False: []}
-        for uav in heard:
-            claim = claims.get(uav)
-            if uav != self._uav and claim is not None and not is_home(claim):
-                by_part[claim.phase is not ClaimPhase.OUT].append(uav)
-        return next(iter((*by_part[True], *by_part[False])), None)
-
-    def _reaches(self, uav: str) -> bool:
-        return uav == self._uav or self._peers.membership.is_credible(uav)
-
-    def _heard(self) -> set[str]:
-        return {*self._peers.membership.present, self._uav}
-
-    def _note_losses(self) -> None:
-        present = self._peers.membership.present
-        mission_s = self._mission_view.mission_s(self._mission_view.now_s)
-        brief = self._brief
-        for uav in () if brief is None else brief.uavs:
-            if uav.id == self._uav or uav.id in present:
-                self._lost_s.pop(uav.id, None)
-            else:
-                self._lost_s.setdefault(uav.id, mission_s)
-
-    def _expired(self) -> set[str]:
-        """Who was lost so long ago that it can't be in the air any more."""
-        brief = self._brief
-        if not self._lost_s or brief is None:
-            return set()
-        mission_s = self._mission_view.mission_s(self._mission_view.now_s)
-        return {
-            uav.id
-            for uav in brief.uavs
-            if uav.id in self._lost_s
-            and mission_s - self._lost_s[uav.id] > (uav.endurance_s or ENDLESS_S)
-        }

@@ -13,7 +13,8 @@ Beside the invariants of the messages (sim.faults.message_log):
 - *disobeys*: no agent that knows of it takes tasks in an aborted mission, or though the
   operator's last word to its UAV was to hold or to come home;
 - *task lost*: in the end each task that was posted, or added by the operator, is done, failed,
-  withdrawn, or open with no UAV able to do it that knew of it before it left, and of a mission
+  withdrawn, or open with no UAV able to do it, or to find a way there that nobody took, that knew
+  of it before it left, and of a mission
   that had begun, and came home of its own accord; or the operator added it too late, when the
   coordinator ended the mission;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
@@ -82,6 +83,8 @@ class InvariantChecker:
         self.message_log = MessageLog()
         self._lives: dict[Process, int] = {}
         self._changed_s: dict[str, float] = {}
+        self._without_way: set[tuple[str, str]] = set()
+        """UAV and task, to which it found no way that nobody took."""
         self._steps = 0
         self._steps_at_s = 0.0
         self._left_in_calm: set[str] = set()
@@ -162,6 +165,7 @@ class InvariantChecker:
             self.message_log.gave_up(process.name, str(released))
         if note.text == "no way" and "task" in note.fields:
             self.message_log.refused(process.name, str(note.fields["task"]))
+            self._without_way.add((process.name, str(note.fields["task"])))
         if note.text == "turns aside":
             self.message_log.turned_aside(self._now_s, process.name, str(note.fields["task"]))
             self._stop_if_broken()
@@ -301,7 +305,7 @@ class InvariantChecker:
                 for uav in home
                 if world.mission.success(uav, task) > 0.0
                 and task.id in to_do.get(uav.id, ())
-                and (uav.id, task.id) not in world.refuses
+                and (uav.id, task.id) not in world.refuses | self._without_way
             ]
             if able and is_field(world.mission):
                 able = self._able_in_field(able, task)

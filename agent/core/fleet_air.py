@@ -1,0 +1,146 @@
+"""What one UAV knows of the air that its fleet shares, and which ways it could ask for.
+
+Leaves out: asking, granting and setting off (agent.core.airway).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+from agent.core.interface import GoTo, Return
+from agent.core.mission_view import MissionView, Peers
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import MissionConfig
+from swarm.protocol.operator_commands import zones_in_force
+from swarm.protocol.registers import Replica
+from swarm.protocol.uav_messages import ClaimPhase
+from swarm.separation.fleet_layers import air_of_brief
+from swarm.separation.shared_air import SharedAir, is_home
+
+ENDLESS_S = 1800.0
+"""How long the way of a lost UAV stays taken whose battery has no end [s]."""
+_ASIDE_M = (1.5, 3.0, 6.0, 12.0)
+"""How far somebody steps aside, in separations."""
+_DIRECTIONS = 8
+
+
+@dataclass(slots=True)
+class Wish:
+    """An order that waits for its way."""
+
+    order: GoTo | Return
+    since_s: float
+    corners_enu_m: tuple[Point, ...]
+    """In the own layer, from where the UAV is to where the order ends [m]."""
+    own_height: bool = False
+    """The height of its end is the task's."""
+    fixed: bool = False
+    """All of it is flown at the heights that it has."""
+    retry_at_s: float = -math.inf
+    asked: bool = False
+    """Whether the own claim asks for it."""
+    yielded: set[tuple[str, int]] = field(default_factory=set)
+    """Requests of others to which it has given way."""
+
+
+class FleetAir:
+    """The air of the brief in force, in the eyes of the agent of ``uav``."""
+
+    def __init__(self, uav: str, replica: Replica, mission_view: MissionView, peers: Peers) -> None:
+        self._uav = uav
+        self._replica = replica
+        self._mission_view = mission_view
+        self._peers = peers
+        self._brief: MissionConfig | None = None
+        self._air: SharedAir | None = None
+        self._lost_s: dict[str, float] = {}
+        """Who is lost, and since when [s mission time]."""
+
+    @property
+    def shared(self) -> SharedAir | None:
+        """None where nobody keeps apart, or this UAV is not in the brief."""
+        brief = self._replica.brief
+        if brief is not self._brief:
+            self._brief = brief
+            self._air = None if brief is None else air_of_brief(brief)
+        return self._air if self._mission_view.me is not None else None
+
+    def ways(
+        self, air: SharedAir, wish: Wish, now_shift_m: float, *, aside: bool, waits: bool
+    ) -> Iterator[tuple[float, tuple[Point, ...]]]:
+        """Shifts and corners of ways to what is wished, those that are nearest first.
+
+        Args:
+            air: in which.
+            wish: what is to be flown.
+            now_shift_m: how much higher than its own layer the UAV is.
+            aside: it is to make room, wherever that leads.
+            waits: it has another wish, which begins above or below where it is.
+        """
+        me = self._mission_view.me
+        if me is None:
+            return
+        shifts_m = [layer_m - me.layer_m for layer_m in air.slabs.layers_m]
+        shifts_m.sort(key=lambda shift_m: abs(shift_m - now_shift_m))
+        if wish.fixed:
+            shifts_m = [0.0]
+        if not aside:
+            yield from ((shift_m, wish.corners_enu_m) for shift_m in shifts_m)
+            return
+        (east_m, north_m, up_m), *_ = wish.corners_enu_m
+        others_m = [shift_m for shift_m in shifts_m if abs(shift_m - now_shift_m) > 1e-6]
+        yield from ((shift_m, wish.corners_enu_m[:1]) for shift_m in others_m)
+        if waits or zones_in_force(self._replica):
+            return
+        for away in _ASIDE_M:
+            for turn in range(_DIRECTIONS):
+                angle, away_m = 2.0 * math.pi * turn / _DIRECTIONS, away * air.slabs.separation_m
+                there = east_m + away_m * math.cos(angle), north_m + away_m * math.sin(angle), up_m
+                yield from ((shift_m, (wish.corners_enu_m[0], there)) for shift_m in shifts_m)
+
+    # -- the others ------------------------------------------------------------------------------
+
+    def note_losses(self) -> None:
+        """Remember since when each of the fleet has been lost."""
+        present = self._peers.membership.present
+        for uav in () if self._brief is None else self._brief.uavs:
+            if uav.id == self._uav or uav.id in present:
+                self._lost_s.pop(uav.id, None)
+            else:
+                self._lost_s.setdefault(uav.id, self._mission_s)
+
+    def expired(self) -> set[str]:
+        """Who was lost so long ago that it can't be in the air any more."""
+        if not self._lost_s or self._brief is None:
+            return set()
+        return {
+            uav.id
+            for uav in self._brief.uavs
+            if uav.id in self._lost_s
+            and self._mission_s - self._lost_s[uav.id] > (uav.endurance_s or ENDLESS_S)
+        }
+
+    def reaches(self, uav: str) -> bool:
+        """Whether ``uav`` could hear a request."""
+        return uav == self._uav or self._peers.membership.is_credible(uav)
+
+    def heard(self) -> set[str]:
+        """Whose requests count."""
+        return {*self._peers.membership.present, self._uav}
+
+    def heir(self) -> str | None:
+        """Who is to keep this UAV's air: somebody who is heard, best one who takes part."""
+        claims = self._replica.claims
+        by_part: dict[bool, list[str]] = {True: [], False: []}
+        for uav in () if self._brief is None else self._brief.uavs:
+            claim = claims.get(uav.id)
+            heard = uav.id != self._uav and self.reaches(uav.id)
+            if heard and claim is not None and not is_home(claim):
+                by_part[claim.phase is not ClaimPhase.OUT].append(uav.id)
+        return next(iter((*by_part[True], *by_part[False])), None)
+
+    @property
+    def _mission_s(self) -> float:
+        return self._mission_view.mission_s(self._mission_view.now_s)
