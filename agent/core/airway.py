@@ -89,6 +89,8 @@ class Airway:
         """Where."""
         self._own_height = False
         """Whether its way ends at the height of a task."""
+        self._at_own_height = False
+        """Whether it hovers where such a way has ended."""
         self._flown_leg = STOP_LEG
         self._wish: Wish | None = None
         self._aside: Wish | None = None
@@ -171,7 +173,8 @@ class Airway:
             return
         # Home, a vehicle goes down to its own layer above its start by itself.
         own_height |= isinstance(order, Return) and not order.land
-        self._wish = Wish(order, self._mission_view.now_s, corners, own_height, fixed)
+        now_s, climbs = self._mission_view.now_s, self._at_own_height or own_height
+        self._wish = Wish(order, now_s, corners, own_height, fixed, climbs and not fixed)
         self._aside = None
         if not self._aloft:
             self._stands_at = self._stands_at or self._standing()
@@ -222,7 +225,7 @@ class Airway:
         elif way.path_enu_m:
             shift_m = 0.0 if self._own_height else way.shift_m
             self._way = replace(way, path_enu_m=way.path_enu_m[-1:], shift_m=shift_m)
-        self._own_height = False
+        self._at_own_height, self._own_height = self._own_height, False
 
     # -- what it claims ----------------------------------------------------------------------------
 
@@ -299,18 +302,18 @@ class Airway:
             return []
         waited_s = now_s - wish.since_s
         if wish.asked or waited_s > GIVES_UP_S:
-            works = isinstance(wish.order, GoTo) and wish.order.task is not None
-            mission_s = self._mission_view.mission_s(now_s)
-            if works and (waited_s > GIVES_UP_S or mission_s > self.sortie_end_s()):
+            task = wish.order.task if isinstance(wish.order, GoTo) else None
+            spent = self._mission_view.mission_s(now_s) > self.sortie_end_s()
+            if task is not None and (waited_s > GIVES_UP_S or spent):
                 self._wish = None
                 self._way = self._hover()
-                self._actions.append(LogLine("no way", {"task": wish.order.task}))
+                self._actions.append(LogLine("no way", {"task": task}))
                 return [Refused(wish.order, "no way there becomes free")]
-            if not works and self._aloft and self._must_go(wish, waited_s):
+            if task is None and self._aloft and self._must_go(wish, waited_s):
                 self._actions.append(LogLine("flies where it may meet others", {}))
                 here = self._hover()
                 start, shift_m = here.path_enu_m[0], here.shift_m
-                path = shifted_path(start, wish.corners_enu_m, shift_m, own_height=wish.own_height)
+                path = shifted_path(start, wish.corners_enu_m, shift_m, wish.end_enu_m)
                 self._way = replace(here, number=self._number(), path_enu_m=path, flies=False)
                 self._depart(wish)
                 self._wish = None
@@ -334,7 +337,7 @@ class Airway:
             air, wish, here.shift_m, aside=wish is self._aside, waits=self._wish is not None
         ):
             start = here.path_enu_m[0] if here.path_enu_m else corners[0]
-            path = shifted_path(start, corners, shift_m, own_height=wish.own_height)
+            path = shifted_path(start, corners, shift_m, wish.end_enu_m)
             if len(path) > MOST_CORNERS:
                 continue
             array = np.array(path)

@@ -38,11 +38,18 @@ class Wish:
     """The height of its end is the task's."""
     fixed: bool = False
     """All of it is flown at the heights that it has."""
+    climbs: bool = False
+    """It leads to or from a height of a task's own."""
     retry_at_s: float = -math.inf
     asked: bool = False
     """Whether the own claim asks for it."""
     yielded: set[tuple[str, int]] = field(default_factory=set)
     """Requests of others to which it has given way."""
+
+    @property
+    def end_enu_m(self) -> Point | None:
+        """Where it ends if that keeps its height [m]."""
+        return self.corners_enu_m[-1] if self.own_height else None
 
 
 class FleetAir:
@@ -86,6 +93,13 @@ class FleetAir:
         shifts_m.sort(key=lambda shift_m: abs(shift_m - now_shift_m))
         if wish.fixed:
             shifts_m = [0.0]
+        if not aside and wish.climbs:  # straight, or in a layer between two climbs
+            yield 0.0, wish.corners_enu_m
+            *between, (east_m, north_m, up_m) = wish.corners_enu_m
+            level = tuple((east_m, north_m, me.layer_m) for east_m, north_m, _ in between)
+            last = (east_m, north_m, me.layer_m if wish.own_height else up_m)
+            yield from ((shift_m, (*level, last)) for shift_m in shifts_m)
+            return
         if not aside:
             yield from ((shift_m, wish.corners_enu_m) for shift_m in shifts_m)
             return

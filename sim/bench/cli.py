@@ -41,6 +41,7 @@ from sim.bench.robustness_commands import (
 )
 from sim.bench.route_commands import routes
 from sim.bench.scale_commands import scale
+from sim.bench.separation_commands import separation
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 from swarm.runtime.options import JsonOption, SeedOption
 from swarm.scenario.files import resolve_scenario
@@ -218,6 +219,7 @@ def decide(
 bench.command("bound", short_help="Measure how close guided is proven.")(bound)
 bench.command("routes", short_help="Search published instances.")(routes)
 bench.command("areas", short_help="Cover areas, beside a fixed split.")(areas)
+bench.command("separation", short_help="Measure what keeping apart costs.")(separation)
 bench.command("failover", short_help="Measure fleets in trouble.")(failover)
 bench.command("flood", short_help="Fly while a hostile peer floods the bus.")(flood)
 bench.command("missions", short_help="Fly many missions in virtual time.")(missions)

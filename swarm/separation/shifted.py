@@ -18,7 +18,10 @@ _NEAR_M = 0.01
 
 
 def shifted_path(
-    here_enu_m: Point, corners_enu_m: Sequence[Point], shift_m: float, *, own_height: bool
+    here_enu_m: Point,
+    corners_enu_m: Sequence[Point],
+    shift_m: float,
+    end_enu_m: Point | None = None,
 ) -> tuple[Point, ...]:
     """The way in a layer that is ``shift_m`` higher than the own one [m].
 
@@ -26,12 +29,12 @@ def shifted_path(
         here_enu_m: where the UAV hovers.
         corners_enu_m: of the way in its own layer, its beginning included.
         shift_m: how much higher.
-        own_height: its end keeps its height.
+        end_enu_m: where it ends if that keeps its height; None: higher as all the rest.
     """
     path = [here_enu_m]
     path += [(east_m, north_m, up_m + shift_m) for east_m, north_m, up_m in corners_enu_m]
-    if own_height:
-        path.append(corners_enu_m[-1])
+    if end_enu_m is not None:
+        path.append(end_enu_m)
     kept = path[:1]
     for point in path[1:]:
         if math.dist(point, kept[-1]) > 1e-6:
