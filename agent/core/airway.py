@@ -136,17 +136,15 @@ class Airway:
         return event
 
     def recall(self, claim: Claim) -> None:
-        """An earlier life of this agent said so."""
-        way = claim.way
-        if self._way is not None or way is None:
-            return
-        self._granted = dict(way.grants)
-        self._aloft = bool(way.path_enu_m) and not (way.grounded and not way.flies)
-        self._moves = way.flies and self._aloft
-        if not way.flies and way.path_enu_m:
-            here = () if way.grounded else way.path_enu_m[:1]
-            way = replace(way, path_enu_m=here, shift_m=hover_shift_m(way), flies=bool(here))
-        self._way = way
+        """An earlier life of this agent said so.
+
+        It may have set off on what it had asked for, and not have said that any more. So the
+        vehicle is somewhere on that way, and stops there before anything else is asked for.
+        """
+        if self._way is None and claim.way is not None:
+            self._way, self._granted = claim.way, dict(claim.way.grants)
+            self._aloft = bool(claim.way.path_enu_m) and (claim.way.flies or not claim.way.grounded)
+            self._moves = bool(claim.way.path_enu_m)
 
     # -- orders ----------------------------------------------------------------------------------
 
@@ -178,7 +176,7 @@ class Airway:
         self._aside = None
         if not self._aloft:
             self._stands_at = self._stands_at or self._standing()
-        if self._moves and not self._stops:
+        if self._moves and self._aloft and not self._stops:
             self._stop()
 
     def _corners(self, order: GoTo | Return) -> tuple[Point, ...] | None:
@@ -281,13 +279,17 @@ class Airway:
     def next_deadline_s(self) -> float | None:
         """When `settle` will next have something to do."""
         wish = self._aside or self._wish
-        return None if wish is None or self._stops or self._moves else wish.retry_at_s
+        return (
+            None
+            if wish is None or self._stops or (self._moves and self._aloft)
+            else wish.retry_at_s
+        )
 
     # -- asking -----------------------------------------------------------------------------------
 
     def _press(self, air: SharedAir, now_s: float) -> list[Refused]:
         """Ask for what is wished, give way to who is stronger, make room, or give up."""
-        if self._stops or self._moves:
+        if self._stops or (self._moves and self._aloft):
             return []
         if self._aside is None and self._room_at_s <= now_s:
             self._room_at_s = now_s + self._retry_s

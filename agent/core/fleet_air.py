@@ -16,8 +16,7 @@ from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import ClaimPhase
-from swarm.separation.fleet_layers import air_of_brief
-from swarm.separation.shared_air import SharedAir, is_home
+from swarm.separation.shared_air import SharedAir, air_of_brief, is_home
 
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end [s]."""

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from swarm.model import Mission
 from swarm.model.layers import FlightLayers, layers_over
-from swarm.protocol.messages import MissionConfig
-from swarm.separation.shared_air import SharedAir, Starter
 from swarm.separation.slabs import Slabs, keeper_rows, shared_layers_m, start_layers
 
 
@@ -53,16 +51,3 @@ def fleet_layers_m(mission: Mission, layers: FlightLayers | None = None) -> tupl
             f"{slabs.separation_m:g} m between UAVs are too few"
         )
     return tuple(slabs.layers_m[layer] for layer in found)
-
-
-def air_of_brief(brief: MissionConfig) -> SharedAir | None:
-    """The air of the mission that ``brief`` tells of; None if nobody keeps apart there."""
-    if brief.separation_m is None or not brief.uavs:
-        return None
-    lowest_m = min(uav.layer_m for uav in brief.uavs)
-    layers_m = shared_layers_m(brief.separation_m, len(brief.uavs), brief.band_m, lowest_m)
-    fleet = []
-    for uav in brief.uavs:
-        east_m, north_m, up_m = uav.position_enu_m
-        fleet.append(Starter(uav.id, (east_m, north_m, up_m + uav.layer_m)))
-    return SharedAir(Slabs(brief.separation_m, layers_m), fleet)

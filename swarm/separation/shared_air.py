@@ -16,8 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from swarm.protocol.fields import Point
+from swarm.protocol.messages import MissionConfig
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
-from swarm.separation.slabs import Path, Slabs, apart, keeper_rows
+from swarm.separation.slabs import Path, Slabs, apart, keeper_rows, shared_layers_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -274,3 +275,16 @@ def is_home(claim: Claim | None) -> bool:
         and claim.way is not None
         and not claim.way.path_enu_m
     )
+
+
+def air_of_brief(brief: MissionConfig) -> SharedAir | None:
+    """The air of the mission that ``brief`` tells of; None if nobody keeps apart there."""
+    if brief.separation_m is None or not brief.uavs:
+        return None
+    lowest_m = min(uav.layer_m for uav in brief.uavs)
+    layers_m = shared_layers_m(brief.separation_m, len(brief.uavs), brief.band_m, lowest_m)
+    fleet = []
+    for uav in brief.uavs:
+        east_m, north_m, up_m = uav.position_enu_m
+        fleet.append(Starter(uav.id, (east_m, north_m, up_m + uav.layer_m)))
+    return SharedAir(Slabs(brief.separation_m, layers_m), fleet)
