@@ -100,8 +100,12 @@ class Airway:
         """Where it stands until its way up is granted."""
         self._lifts_enu_m: Point | None = None
         """Where it will be in the air that stands on the ground, in its own layer [m]."""
+        self._settled: tuple[object, ...] = ()
+        """What the last look rested on."""
         self._left_base = False
         """Whether it has taken off from there since it last said anything."""
+        self._looks_again = False
+        """Whether somebody may still have to be let by."""
         self._room_at_s = -math.inf
         """Not before does it look again whether it is in anybody's way."""
         self._place: Point | None = None
@@ -256,6 +260,8 @@ class Airway:
         air, claim = self._shared, self._replica.claims.get(self._uav)
         if air is None or claim is None:
             return []
+        if not self._has_changed(now_s):
+            return []
         self._fleet.note_losses()
         refused = self._press(air, now_s)
         self._granted = air.granted(
@@ -263,6 +269,15 @@ class Airway:
         )
         self._depart_if_granted(air, now_s)
         return refused
+
+    def _has_changed(self, now_s: float) -> bool:
+        """Whether anything is new since the last look: most steps are about something else."""
+        due_s = self.next_deadline_s()
+        told = (self._way, self._wish, self._aside, self._stops, self._moves, self._aloft)
+        now = (*self._replica.claims.values(), *told, len(self._fleet.heard()))
+        same = now == self._settled and (due_s is None or due_s > now_s)
+        self._settled = now
+        return not same
 
     def restated(self) -> Claim | None:
         """The own claim, if what is to be told of the air has changed since it was said."""
@@ -279,11 +294,10 @@ class Airway:
     def next_deadline_s(self) -> float | None:
         """When `settle` will next have something to do."""
         wish = self._aside or self._wish
-        return (
-            None
-            if wish is None or self._stops or (self._moves and self._aloft)
-            else wish.retry_at_s
-        )
+        if self._stops or (self._moves and self._aloft):
+            return None
+        again_s = self._room_at_s if self._looks_again else None
+        return again_s if wish is None else wish.retry_at_s
 
     # -- asking -----------------------------------------------------------------------------------
 
@@ -291,9 +305,10 @@ class Airway:
         """Ask for what is wished, give way to who is stronger, make room, or give up."""
         if self._stops or (self._moves and self._aloft):
             return []
-        if self._aside is None and self._room_at_s <= now_s:
+        self._looks_again = self._aside is None and self._room_at_s > now_s
+        if self._aside is None and not self._looks_again:
             self._room_at_s = now_s + self._retry_s
-            self._make_room(air, now_s)
+            self._looks_again = self._make_room(air, now_s)
         if self._aside is not None:
             if now_s - self._aside.since_s > _ASIDE_PATIENCE * self._retry_s:
                 self._aside, self._way = None, self._hover()
@@ -390,11 +405,14 @@ class Airway:
                 return asks
         return None
 
-    def _make_room(self, air: SharedAir, now_s: float) -> None:
-        """Step aside for who asks for where this UAV hovers, unless it is at work."""
+    def _make_room(self, air: SharedAir, now_s: float) -> bool:
+        """Step aside for who asks for where this UAV hovers, unless it is at work.
+
+        Gives whether there is anybody to step aside for.
+        """
         here = self._hover()
         if self._moves or not self._aloft or not here.path_enu_m or not self._may_leave:
-            return
+            return False
         claims, place = self._claims(), np.array(here.path_enu_m)
         for uav in air.in_the_way(self._uav, place, claims, self._fleet.expired()):
             waits = self._wish is not None
@@ -403,7 +421,8 @@ class Airway:
             corner = self._nominal(here.path_enu_m[0])
             order = GoTo(STOP_LEG, corner)
             self._aside = Wish(order, now_s, (corner,))
-            return
+            return True
+        return False
 
     @property
     def _may_leave(self) -> bool:

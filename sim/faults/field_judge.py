@@ -160,11 +160,13 @@ class FieldJudge:
         for base in self.world.mission.bases:
             stays = [stay for stay in self.world.flight_log.stays if stay.base == base.id]
             for stay in stays if base.slots is not None else []:
-                here = [
-                    other.uav
-                    for other in stays
-                    if other.begin_s <= stay.begin_s and stay.begin_s + 1e-9 < other.end_s
-                ]
+                here = sorted(
+                    {
+                        other.uav
+                        for other in stays
+                        if other.begin_s <= stay.begin_s and stay.begin_s + 1e-9 < other.end_s
+                    }
+                )
                 if len(here) > (base.slots or 0):
                     yield f"{', '.join(here)} stand at {base.id} at {stay.begin_s:.3f} s"
 

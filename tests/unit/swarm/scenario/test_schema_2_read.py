@@ -389,7 +389,10 @@ WRONG: dict[str, tuple[str, str, list[str]]] = {
         "zone_margin_m = 5",
         "zone_margin_m = 5\nseparation_m = 0.0",
         [
-            "mission.separation_m: 0.0 is not >= 0.1; give a distance within 0.1..1e6 [m], such as 10.0"
+            (
+                "mission.separation_m: 0.0 is not >= 0.1; "
+                "give a distance within 0.1..1e6 [m], such as 10.0"
+            )
         ],
     ),
 }
