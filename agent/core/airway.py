@@ -415,12 +415,10 @@ class Airway:
             return False
         claims, place = self._claims(), np.array(here.path_enu_m)
         for uav in air.in_the_way(self._uav, place, claims, self._fleet.expired()):
-            waits = self._wish is not None
-            if waits and strength(self._uav, claims) < strength(uav, claims):
+            if self._wish is not None and strength(self._uav, claims) < strength(uav, claims):
                 continue
             corner = self._nominal(here.path_enu_m[0])
-            order = GoTo(STOP_LEG, corner)
-            self._aside = Wish(order, now_s, (corner,))
+            self._aside = Wish(GoTo(STOP_LEG, corner), now_s, (corner,))
             return True
         return False
 

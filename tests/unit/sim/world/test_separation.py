@@ -1,0 +1,51 @@
+"""UAVs that would meet in one layer: with a separation they pass above each other, or wait."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from sim.faults.case import quick_plan
+from sim.world.simulation import SimulatedMission, simulate_mission
+from sim.world.uncertainty import Uncertainty
+from swarm.model import Mission, Task, TaskId, Uav, UavId
+
+FOUR = [(0.0, 0.0), (100.0, 0.0), (0.0, 100.0), (100.0, 100.0)]
+"""Starts; everybody's task is opposite."""
+
+
+def crossing(layers: int) -> Mission:
+    """Four UAVs each of which can do the task opposite alone, through the middle."""
+    fleet = tuple(
+        Uav(UavId(f"u{k}"), (*start, 0.0), 10.0, {f"t{k}": 1.0}) for k, start in enumerate(FOUR)
+    )
+    board = tuple(
+        Task(TaskId(f"t{k}"), (100.0 - east, 100.0 - north, 0.0), 1.0)
+        for k, (east, north) in enumerate(FOUR)
+    )
+    band_m = (30.0, 30.5 + 12.0 * (layers - 1))
+    return Mission("crossing", 400.0, fleet, board, 0.0, separation_m=10.0, band_m=band_m)
+
+
+def fly(mission: Mission) -> SimulatedMission:
+    return simulate_mission(
+        mission, method="greedy", seed=1, uncertainty=Uncertainty(), planner=quick_plan
+    )
+
+
+@pytest.mark.parametrize("layers", [2, 4])
+def test_who_would_meet_in_the_middle_keeps_the_distance_and_all_is_done(layers: int) -> None:
+    flown = fly(crossing(layers))
+    nearest_m = flown.world.closest_approach_m()
+
+    assert sorted(flown.result.done) == ["t0", "t1", "t2", "t3"]
+    assert nearest_m is not None
+    assert nearest_m >= 10.0 - 1e-6
+
+
+def test_without_a_separation_they_pass_in_their_own_layers() -> None:
+    nearest_m = fly(replace(crossing(4), separation_m=None)).world.closest_approach_m()
+
+    assert nearest_m is not None
+    assert nearest_m < 10.0
