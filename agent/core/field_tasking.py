@@ -43,7 +43,6 @@ class FieldTasking(Tasking):
     def __init__(self, context: AgentContext, make_rule: RuleMaker = rule_of) -> None:
         super().__init__(context, make_rule)
         self._sortie = self._flights.meter.sortie
-        self._airway.sortie_end_s = lambda: self._sortie.end_s
         self._visits = BaseVisits(context, self._flights, self._sortie, self._visit_over)
         self._limits = TimeLimits(context, self._flights, self._sortie)
         self._refused_bases = RefusedTasks(context.timing.reconsider_s)

@@ -57,6 +57,7 @@ class Flights(AgentPart):
         self.meter = FlightMeter(context)
         """Is told of every leg."""
         context.airway.when_departed = self.meter.depart_late
+        context.airway.sortie_end_s = lambda: self.meter.sortie.end_s
         self._zones: tuple[ZoneSpec, ...] = ()
         self._home: HomeFlight | None = None
         self._home_from: object = None
