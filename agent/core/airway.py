@@ -122,8 +122,8 @@ class Airway:
                 return replace(event, position_enu_m=self._nominal(place))
             case VehicleReady():
                 self._aloft = True
-            case Arrived(leg=leg) if leg == self._flown_leg and self._way is not None:
-                self._arrive(self._way)
+            case Arrived(leg=leg) if leg == self._flown_leg:
+                self._arrive(self._told_way)
             case Held():
                 self._moves, self._stops = True, False  # it is somewhere on its way
             case Landed() | Home():
