@@ -28,6 +28,7 @@ from agent.core.interface import (
 )
 from agent.core.memory import RecoveredState, SaveCondition
 from agent.core.mission_view import MissionView, Peers
+from agent.core.near_traffic import NearTraffic
 from agent.core.state_sync import StateSync
 from agent.core.states import (
     HEADED_HOME,
@@ -140,6 +141,8 @@ class AgentCore(AgentPart):
         )
         super().__init__(context)
         self._tasking = FieldTasking(context, make_rule)
+        self._near_traffic = NearTraffic(context, is_flown=verticals is not None)
+        self._near_traffic.when_disturbed = self._tasking.disturbed
         self._ending = EndCondition(context)
         self._commander = VehicleCommander(context, self._tasking, self._ending)
         self._sync = StateSync(context, self._tasking)
@@ -171,6 +174,7 @@ class AgentCore(AgentPart):
             now_s: now, on this process's own clock [s]; never decreases.
         """
         self._mission_view.now_s = now_s
+        self._near_traffic.sense(event)
         event = self._airway.hear(event)
         if isinstance(event, Telemetry) and self._is_place_alone(now_s):
             self._mission_view.move(event)
@@ -208,6 +212,7 @@ class AgentCore(AgentPart):
             self._announcer.next_deadline_s(),
             self._tasking.next_deadline_s(),
             self._airway.next_deadline_s(),
+            self._near_traffic.next_deadline_s(),
             self._ending.next_deadline_s() if self._knows_enough else None,
             self._queries.next_deadline_s(),
             self._recovered.next_deadline_s() if self._is_beginning else None,
@@ -258,6 +263,7 @@ class AgentCore(AgentPart):
         match event:
             case MessageReceived(message):
                 self._sync.hear(message, now_s)
+                self._near_traffic.hear(message, now_s)
             case SnapshotsReceived(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):
@@ -479,6 +485,7 @@ class AgentCore(AgentPart):
             self._airway.settle(now_s)
         if (restated := self._airway.restated()) is not None:
             self._say(restated)
+        self._near_traffic.settle(now_s)
 
     def _end_step(self, now_s: float) -> list[Action]:
         """What came of the step; a change worth it is kept for a later life."""

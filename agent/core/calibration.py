@@ -233,6 +233,10 @@ class FlightMeter(AgentPart):
         if climb_s >= self.rates.climb_s:
             self._vote(self._medians.climbs, climb_s + STEP_S, _VERTICAL_RANGE, now_s)
 
+    def disturb(self) -> None:
+        """The leg under way is not flown as it was ordered."""
+        self._departure = None
+
     def depart_late(self) -> None:
         """The leg that was told last begins only now: its way was taken until then."""
         if self._departure is not None:

@@ -131,10 +131,27 @@ class Return:
     """Land at `via_enu_m` rather than return to launch from there."""
 
 
+@dataclass(frozen=True, slots=True)
+class GiveWay:
+    """Leave the way of another UAV, and go on as ordered once the next `GiveWay` says nothing more.
+
+    What the vehicle was ordered stays its order. It concerns a vehicle that flies to a target,
+    hovers, or is on its way home by a place; for any other it means nothing.
+    """
+
+    path_enu_m: tuple[tuple[float, float, float], ...] = ()
+    """Corners to fly through instead, the last to hover at [m; mission origin, height included];
+    none: it flies as ordered."""
+    stands: bool = False
+    """Stop, and stay there."""
+    speed_m_s: float | None = None
+    """Fly as ordered, no faster than that; None: as fast as ever."""
+
+
 VehicleWord = Ready | KeepOut
 """What a vehicle is told that moves nothing."""
 
-VehicleOrder = Prepare | GoTo | Swap | Hold | Return | VehicleWord
+VehicleOrder = Prepare | GoTo | Swap | Hold | Return | GiveWay | VehicleWord
 
 
 @dataclass(frozen=True, slots=True)

@@ -116,6 +116,10 @@ class Tasking(AgentPart, ABC):
         """The mission is known, or the vehicle has said its limits: tell how it will fly."""
         self._flights.meter.introduce(limits)
 
+    def disturbed(self) -> None:
+        """The vehicle gives way to another: the time of this leg tells nothing."""
+        self._flights.meter.disturb()
+
     def begin(self, now_s: float) -> None:
         """The vehicle takes targets: fly to the resumed task, or be free."""
         task = self._task()

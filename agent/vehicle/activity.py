@@ -23,6 +23,7 @@ class FlightPhase(Enum):
     HOVERING = "hovering"
     FLYING = "flying"
     HOLDING = "being stopped"
+    YIELDING = "giving way"
     RETURNING = "returning"
     LANDING = "landing"
     STANDING = "standing at its base"

@@ -18,6 +18,7 @@ import math
 from functools import partial
 
 from agent.core.interface import (
+    GiveWay,
     GoTo,
     Hold,
     KeepOut,
@@ -134,8 +135,8 @@ class Bridge:
             case GoTo() if self._activity.in_our_hands and not session.is_placed:
                 # Told in a moment: an agent that was held up has heard no position meanwhile.
                 self._kept, self._kept_until_s = event, now_s + self.config.position_timeout_s
-            case Prepare() | GoTo() | Swap() | Hold() | Return() | Ready() | KeepOut():
-                if not isinstance(event, Ready | KeepOut):
+            case Prepare() | GoTo() | Swap() | Hold() | Return() | GiveWay() | Ready() | KeepOut():
+                if not isinstance(event, GiveWay | Ready | KeepOut):
                     self._kept = None
                 self._activity = obey(self._activity, event, session)
             case LinkOpened():

@@ -24,6 +24,7 @@ from agent.vehicle.leg import TARGET_TAG
 from agent.vehicle.messages import Heartbeat, LandedState, Position
 from agent.vehicle.returning import Returning
 from agent.vehicle.session import VehicleSession
+from agent.vehicle.yielding import Yielding
 from swarm.model.frames import wgs84_from_enu
 
 
@@ -37,6 +38,7 @@ class Holding(Activity):
         returning: what goes on if the vehicle cannot be stopped.
         prepare_next: ordered of a vehicle that has to be stopped first.
         go_next: alike.
+        yielding: how it makes room for another UAV once it stands.
     """
 
     phase = FlightPhase.HOLDING
@@ -53,12 +55,14 @@ class Holding(Activity):
         returning: Returning | None = None,
         prepare_next: Prepare | None = None,
         go_next: GoTo | None = None,
+        yielding: Yielding | None = None,
     ) -> None:
         super().__init__(session)
         self.order = order
         self.returning = returning
         self.prepare_next = prepare_next
         self.go_next = go_next
+        self.yielding = yielding
         self._firmware = firmware
         self._leaves = leaves
         self._motors_asked = motors_asked

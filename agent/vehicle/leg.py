@@ -318,7 +318,7 @@ class Flying(Activity):
 
     def __init__(self, session: VehicleSession, firmware: Firmware, order: GoTo) -> None:
         super().__init__(session)
-        self._order = order
+        self.order = order
         self._leg: RepositionLeg | _MissionLeg
         if session.mission is not None:
             self._leg = _MissionLeg(session, order, session.mission)
@@ -331,7 +331,7 @@ class Flying(Activity):
     @property
     def trigger_m(self) -> float | None:
         """As the order has it."""
-        return self._order.trigger_m
+        return self.order.trigger_m
 
     def start(self) -> None:
         """Tell the vehicle, in place of whatever it was told before."""
@@ -349,7 +349,8 @@ class Flying(Activity):
 
     def on_position(self, position: Position) -> None:
         """Judge speed and arrival."""
-        session, told_m_s = self._session, self._session.cruise_speed_m_s
+        session = self._session
+        told_m_s = session.pace_m_s or session.cruise_speed_m_s
         velocity_enu_m_s = position.velocity_enu_m_s
         session.cruise_watch.judge(velocity_enu_m_s, told_m_s, session.now_s)
         session.tell_caution("speed", session.cruise_watch.remark)
@@ -358,10 +359,10 @@ class Flying(Activity):
     def outcome(self) -> Arrived | HandedOver | Refused | None:
         """How the leg ended; None while it is under way."""
         if self._leg.arrived:
-            return Arrived(self._order.leg)
+            return Arrived(self.order.leg)
         if self._leg.stopped is not None:
             return HandedOver(self._leg.stopped)
         failure = self._leg.failure
         if failure is None:
             return None
-        return Refused(self._order, self._session.in_its_words(failure))
+        return Refused(self.order, self._session.in_its_words(failure))

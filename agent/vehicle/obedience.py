@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 
 from agent.core.interface import (
+    GiveWay,
     GoTo,
     Held,
     Hold,
@@ -35,6 +36,7 @@ from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning, ReturnVia
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.standing import Departing, Standing
+from agent.vehicle.yielding import HOLD, Yielding, gives_way, pending_of, set_pace
 
 _UNHEARD_TIMEOUTS = 3.0
 """A vehicle that may be in the air has that many silence timeouts to be heard at all."""
@@ -82,7 +84,11 @@ class Searching(Activity):
 
 def obey(activity: Activity, order: VehicleOrder, session: VehicleSession) -> Activity:
     """Carry an order out, or refuse it."""
+    if isinstance(order, Prepare | Swap | Hold | Return):
+        set_pace(session, None)
     match order:
+        case GiveWay():
+            return give_way(activity, order, session)
         case Prepare():
             return begin_preparing(activity, order, session)
         case GoTo():
@@ -147,6 +153,8 @@ def go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
             else:
                 activity.next_order = order
             return activity
+        case Yielding() | Holding(yielding=Yielding()):
+            return _go_on_there(activity, order, session)
         case Hovering() | Flying():
             takes_targets = True
         case Holding(returning=None) if session.mission is not None:
@@ -171,6 +179,55 @@ def go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
     session.sent_to_enu_m.append(order.position_enu_m)
     flying.start()
     return flying
+
+
+def _go_on_there(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
+    """Take an order for when the vehicle has made room."""
+    yielding = activity.yielding if isinstance(activity, Holding) else activity
+    if fault := _fault_of(order, session.config) or _way_fault(order, session):
+        session.report(Refused(order, fault))
+    elif isinstance(yielding, Yielding):
+        yielding.pending = order
+    return activity
+
+
+def give_way(activity: Activity, order: GiveWay, session: VehicleSession) -> Activity:
+    """Make room for another UAV, or go on; whoever can't be interrupted goes on in any case."""
+    firmware = session.firmware
+    if isinstance(activity, Holding) and activity.yielding is not None:
+        activity.yielding.wanted = order  # it is being stopped: what is wanted follows
+        return activity
+    if firmware is None or not gives_way(activity) or session.silent:
+        return activity
+    set_pace(session, order.speed_m_s)
+    if not (order.stands or order.path_enu_m):
+        return go_on(activity, session) if isinstance(activity, Yielding) else activity
+    yielding = Yielding(session, firmware, pending_of(activity, session), order)
+    heartbeat = session.vehicle.heartbeat
+    commanded = heartbeat is not None and firmware.is_commanded(heartbeat.custom_mode)
+    if order.stands or not commanded or not (session.mission is None or _is_by_target(activity)):
+        return begin_holding(activity, HOLD, session, yielding=yielding)
+    session.commands.cancel_all()
+    yielding.begin()
+    return yielding
+
+
+def _is_by_target(activity: Activity) -> bool:
+    """Whether no mission of ours is flown, or about to be."""
+    return isinstance(activity, Yielding | Returning)
+
+
+def go_on(yielding: Yielding, session: VehicleSession) -> Activity:
+    """There is room: obey what was ordered before, or since."""
+    session.commands.cancel_all()
+    after = Hovering(session)
+    match yielding.pending:
+        case GoTo() as order:
+            return go_to(after, order, session)
+        case Return() as order:
+            return return_home(after, order, session)
+        case None:
+            return after
 
 
 def _must_stand_first(activity: Activity, order: GoTo, session: VehicleSession) -> bool:
@@ -276,6 +333,7 @@ def begin_holding(
     session: VehicleSession,
     prepare_next: Prepare | None = None,
     go_next: GoTo | None = None,
+    yielding: Yielding | None = None,
 ) -> Activity:
     """Stop a vehicle that flies on our orders, or is about to."""
     firmware, heartbeat, mission = session.firmware, session.vehicle.heartbeat, session.mission
@@ -299,9 +357,10 @@ def begin_holding(
         order,
         leaves,
         motors_asked=preparing and activity.in_our_hands,
-        returning=returning,
+        returning=None if yielding is not None else returning,
         prepare_next=prepare_next,
         go_next=go_next,
+        yielding=yielding,
     )
 
 
@@ -317,6 +376,10 @@ def return_home(activity: Activity, order: Return, session: VehicleSession) -> A
             if via is not None:
                 activity.go_by(order, via)
         return activity
+    yielding = activity.yielding if isinstance(activity, Holding) else activity
+    if isinstance(yielding, Yielding) and order.via_enu_m is not None:
+        yielding.pending = order
+        return activity
     session.commands.cancel_all()
     if isinstance(activity, Standing):
         session.report(Home())
@@ -329,7 +392,7 @@ def return_home(activity: Activity, order: Return, session: VehicleSession) -> A
     if session.flies_unknown_mission():
         return Searching(session, order)
     mode = heartbeat.custom_mode
-    flew = isinstance(activity, Hovering | Flying | Holding | Landing)
+    flew = isinstance(activity, Hovering | Flying | Holding | Landing | Yielding)
     took_off = activity.took_off or flew
     taking_off = firmware.is_taking_off(mode) and (took_off or order.resume)
     on_mission = mission is not None and (

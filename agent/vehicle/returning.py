@@ -88,6 +88,11 @@ class Returning(Activity):
             or (self._from_mission and firmware.is_mission(custom_mode))
         )
 
+    @property
+    def flies_by_place(self) -> bool:
+        """Whether it still flies to a place first, by targets."""
+        return self._return_via is not None and not self._seen
+
     def has_begun(self) -> bool:
         """Whether the return mode has been seen; true once."""
         news, self._told_seen = self._seen and not self._told_seen, self._seen

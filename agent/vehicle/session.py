@@ -96,6 +96,8 @@ class VehicleSession(Conversation):
         """When it takes pictures."""
         self.cruise_speed_m_s = 0.0
         """Of the last preparation; 0 before the first."""
+        self.pace_m_s: float | None = None
+        """Slower than that, as it gives way to another UAV; None: it does not."""
         self.planned_m_s2: float | None = None
         """Acceleration that the mission counts on; None: it says none."""
         self.set_m_s2: float | None = None

@@ -31,6 +31,7 @@ from agent.vehicle.obedience import (
     begin_holding,
     begin_preparing,
     come_home,
+    go_on,
     go_to,
     refuse_return,
     return_home,
@@ -40,6 +41,7 @@ from agent.vehicle.preparation import Preparing
 from agent.vehicle.returning import Returning
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.standing import Departing, Standing
+from agent.vehicle.yielding import Yielding
 
 _IN_THE_AIR = {
     FlightPhase.HOLDING,
@@ -67,16 +69,25 @@ SUCCESSORS: Final[dict[FlightPhase, frozenset[FlightPhase]]] = {
             *_LET_GO,
         }
     ),
-    FlightPhase.HOVERING: frozenset({FlightPhase.FLYING, *_IN_THE_AIR, *_LET_GO}),
-    FlightPhase.FLYING: frozenset({FlightPhase.HOVERING, *_IN_THE_AIR, *_LET_GO}),
+    FlightPhase.HOVERING: frozenset(
+        {FlightPhase.FLYING, FlightPhase.YIELDING, *_IN_THE_AIR, *_LET_GO}
+    ),
+    FlightPhase.FLYING: frozenset(
+        {FlightPhase.HOVERING, FlightPhase.YIELDING, *_IN_THE_AIR, *_LET_GO}
+    ),
     FlightPhase.LANDING: frozenset(
         {FlightPhase.STANDING, FlightPhase.HOVERING, *_IN_THE_AIR, *_LET_GO}
     ),
-    FlightPhase.STANDING: frozenset({FlightPhase.PREPARING, *_LET_GO}),
-    FlightPhase.HOLDING: frozenset(
+    FlightPhase.YIELDING: frozenset(
         {FlightPhase.HOVERING, FlightPhase.FLYING, *_IN_THE_AIR, *_LET_GO}
     ),
-    FlightPhase.RETURNING: frozenset({FlightPhase.HOVERING, *_IN_THE_AIR, *_LET_GO}),
+    FlightPhase.STANDING: frozenset({FlightPhase.PREPARING, *_LET_GO}),
+    FlightPhase.HOLDING: frozenset(
+        {FlightPhase.HOVERING, FlightPhase.FLYING, FlightPhase.YIELDING, *_IN_THE_AIR, *_LET_GO}
+    ),
+    FlightPhase.RETURNING: frozenset(
+        {FlightPhase.HOVERING, FlightPhase.YIELDING, *_IN_THE_AIR, *_LET_GO}
+    ),
     FlightPhase.HANDED_OVER: frozenset(
         {FlightPhase.PREPARING, FlightPhase.RETURNING, FlightPhase.HOVERING, FlightPhase.IDLE}
     ),
@@ -195,6 +206,8 @@ def _after_hold(holding: Holding, session: VehicleSession) -> Activity:
     go_next = holding.go_next
     session.commands.cancel_all()
     after = Hovering(session) if holding.aloft else Idle(session)
+    if holding.yielding is not None and holding.aloft:
+        return _after_stop(holding, holding.yielding, session)
     if holding.failure is not None:
         if mission is not None and returning is None:
             mission.carry_on()
@@ -215,6 +228,17 @@ def _after_hold(holding: Holding, session: VehicleSession) -> Activity:
     # It may have landed before it could be stopped.
     session.report(Home() if returning is not None and not holding.aloft else Held())
     return after
+
+
+def _after_stop(holding: Holding, yielding: Yielding, session: VehicleSession) -> Activity:
+    """It stands, to make room; or it could not be stopped, and goes on as it was ordered."""
+    if session.mission is not None:
+        session.mission.stand_down()
+    wanted = yielding.wanted
+    if holding.failure is not None or not (wanted.stands or wanted.path_enu_m):
+        return go_on(yielding, session)
+    yielding.begin()
+    return yielding
 
 
 def _after_landing(landing: Landing, session: VehicleSession) -> Activity:

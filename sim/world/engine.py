@@ -19,7 +19,14 @@ from typing import Any, Protocol
 import numpy as np
 
 from agent.core.interface import Telemetry
-from swarm.protocol.events import CommonEvent, LinkChanged, MessageReceived, SnapshotsReceived, Tick
+from swarm.protocol.events import (
+    Cell,
+    CommonEvent,
+    LinkChanged,
+    MessageReceived,
+    SnapshotsReceived,
+    Tick,
+)
 from swarm.protocol.messages import Snapshot
 from swarm.runtime.shell import Core
 
@@ -144,6 +151,8 @@ class Process:
         """Whether this life has ended, in whatever way."""
         self.held = False
         """Whether it processes nothing for now."""
+        self.cells: frozenset[Cell] = frozenset()
+        """Of the sky, whose traffic it hears."""
         self.linked = True
         """Whether, for all it has been told, its own link is up."""
         self._queue = queue

@@ -12,6 +12,7 @@ from typing import Protocol
 
 from sim.world.engine import EventQueue
 from swarm.protocol.events import (
+    Cell,
     CommonEvent,
     MessageReceived,
     PeerGone,
@@ -20,7 +21,7 @@ from swarm.protocol.events import (
 )
 from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.timing import PRESETS, LinkKind
-from swarm.protocol.uav_messages import Choice, Status
+from swarm.protocol.uav_messages import Choice, Nearby, Status
 
 
 class Node(Protocol):
@@ -33,6 +34,8 @@ class Node(Protocol):
 
     writer: str | None
     """Whose token it holds and for whom it answers; None for an observer."""
+    cells: frozenset[Cell]
+    """Of the sky, whose traffic it hears."""
 
     def receive(self, fact: CommonEvent) -> None:
         """Something has arrived; nothing happens any more at the seat of one that ended."""
@@ -99,9 +102,14 @@ class IdealNetwork:
         self._tell_all(PeerSeen(writer), seat)
 
     def publish(self, sender: Node, message: Message) -> None:
-        """Tell everyone; status and choices go to observers only."""
-        for_onlookers = isinstance(message.body, Status | Choice)
-        self._tell_all(MessageReceived(message), sender, onlookers_only=for_onlookers)
+        """Tell everyone whom it concerns."""
+
+        def tell() -> None:
+            for seat in tuple(self._seats):
+                if seat is not sender and concerns(message, seat):
+                    seat.receive(MessageReceived(message))
+
+        self._later(tell)
 
     def ask(self, asker: Node, of: Collection[str] = ()) -> None:
         """All who are asked answer at one instant."""
@@ -114,10 +122,10 @@ class IdealNetwork:
 
         self._later(answer)
 
-    def _tell_all(self, fact: CommonEvent, sender: Node, *, onlookers_only: bool = False) -> None:
+    def _tell_all(self, fact: CommonEvent, sender: Node) -> None:
         def tell() -> None:
             for seat in tuple(self._seats):
-                if seat is not sender and not (onlookers_only and seat.writer is not None):
+                if seat is not sender:
                     seat.receive(fact)
 
         self._later(tell)
@@ -128,6 +136,18 @@ class IdealNetwork:
 
     def _later(self, callback: Callable[[], None]) -> None:
         self._queue.after(self._latency_s, callback)
+
+
+def concerns(message: Message, seat: Node) -> bool:
+    """Whether who sits there has subscribed to that: status and choices are for observers, what
+    UAVs say to those near them is for who has tuned in to their cell."""
+    match message.body:
+        case Status() | Choice():
+            return seat.writer is None
+        case Nearby(cell=cell):
+            return cell in seat.cells
+        case _:
+            return True
 
 
 class Topology(StrEnum):
@@ -167,6 +187,7 @@ class RouterNode:
 
     name: str = "router"
     writer: str | None = None
+    cells: frozenset[Cell] = frozenset()
 
     def receive(self, fact: CommonEvent) -> None:
         """Routers take no part."""

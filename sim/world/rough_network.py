@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 from sim.world.engine import EventQueue, stream, uniforms
-from sim.world.network import NetworkConditions, Node, RouterNode, Topology
+from sim.world.network import NetworkConditions, Node, RouterNode, Topology, concerns
 from swarm.protocol.events import (
     CommonEvent,
     LinkChanged,
@@ -27,7 +27,6 @@ from swarm.protocol.events import (
     SnapshotsReceived,
 )
 from swarm.protocol.messages import Message, Snapshot
-from swarm.protocol.uav_messages import Choice, Status
 
 
 @dataclass(slots=True)
@@ -114,10 +113,10 @@ class RoughNetwork:
                 self._queue.after(self._conditions.latency_s, partial(self._show, viewer, seat))
 
     def publish(self, sender: Node, message: Message) -> None:
-        """Tell everyone it reaches; status and choices go to observers only."""
-        for_onlookers, fact = isinstance(message.body, Status | Choice), MessageReceived(message)
+        """Tell everyone whom it concerns and reaches."""
+        fact = MessageReceived(message)
         for seat in self._seats:
-            if seat is not sender and not (for_onlookers and seat.writer is not None):
+            if seat is not sender and concerns(message, seat):
                 self._send(sender, seat, fact)
 
     def ask(self, asker: Node, of: Collection[str] = ()) -> None:

@@ -58,7 +58,7 @@ from swarm.model import Mission
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.model.layers import FlightLayers
 from swarm.model.plan import Schedule
-from swarm.protocol.events import Ask, Finish, LogLine, Publish, PublishLast, Save
+from swarm.protocol.events import Ask, Finish, LogLine, Publish, PublishLast, Save, TuneIn
 from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoch, Snapshot
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import BaseStage, Claim, Outcome, Status
@@ -285,6 +285,8 @@ class World:
                 self._order(process, order)
             case Ask(of):
                 self.network.ask(process, of)
+            case TuneIn(cells):
+                process.cells = cells
             case MakePlan(request, mission, method, seed):
                 plan = self._make_plan(mission, method, seed)
                 if self.mission_state.plan is None or self.zero_s is None:

@@ -39,6 +39,8 @@ STATUS_HZ: Final = 200.0
 least (measured, 10 UAVs and 60 tasks at 20 times the pace)."""
 CHOICE_HZ: Final = 200.0
 """Of each UAV's choices, one for each decision; lost ones are missed by nobody who flies."""
+NEARBY_HZ: Final = 200.0
+"""Of what each UAV says to those near it: 4 a second of mission time while somebody is near."""
 QUESTIONS_HZ: Final = 50.0
 """Of questions to everybody, by each neighbour; honest ones are 0.2 s apart."""
 QUESTION_BYTES: Final = 1 << 20
@@ -136,6 +138,7 @@ def _rates(roster: Roster, keys: KeySpace) -> list[dict[str, Any]]:
     uavs = [entry.name for entry in roster.entries if entry.role is Role.UAV]
     rates = [(keys.status(uav), STATUS_HZ) for uav in uavs]
     rates += [(keys.choice(uav), CHOICE_HZ) for uav in uavs]
+    rates += [(keys.near(uav, "*", "*"), NEARBY_HZ) for uav in uavs]
     limits = [_limit("news", "put", rates)] if rates else []
     if len(_of_role(roster.entries, Role.ROUTER)) < 2:
         limits.append(_limit("questions", "query", [(keys.state("*"), QUESTIONS_HZ)]))
@@ -154,7 +157,7 @@ def _limit(name: str, message: str, rates: Iterable[tuple[str, float]]) -> dict[
 def _sizes(keys: KeySpace) -> list[dict[str, Any]]:
     """How long what is said may be; any process would drop what is longer."""
     small = [keys.claim("*"), keys.status("*"), keys.outcome("*", "*"), keys.calibration("*")]
-    small.append(f"{keys.root}/operator/**")
+    small += [f"{keys.root}/operator/**", keys.near("*", "*", "*")]
     large = [f"{keys.root}/**"]
     return [
         _size("small", "put", small, SMALL_LIMIT_BYTES + ENVELOPE_BYTES),

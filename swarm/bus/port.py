@@ -288,6 +288,12 @@ class Bus(Protocol):
         unread sample of each key.
         """
 
+    def unsubscribe(self, key_expr: str) -> None:
+        """Receive nothing more by that very subscription; fine if there is none.
+
+        What has arrived may still be in the inbox.
+        """
+
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token on ``key`` until this process or its link ends.
 

@@ -173,6 +173,8 @@ class ZenohBus:
         self._writer = WriterThread("zenoh writer")
         self._closed = False
         self._subscribed: dict[str, bool] = {}
+        self._subscribers: dict[str, zenoh.Subscriber[None]] = {}
+        """By key expression; the writer's thread alone looks at them."""
         self._watched: set[str] = set()
         self._served: set[str] = set()
         self._tokens: dict[str, zenoh.LivelinessToken | None] = {}
@@ -221,7 +223,17 @@ class ZenohBus:
             on_sample = _direct(partial(self._on_sample, key_expr))
             declare = self._session.declare_subscriber
             remote = zenoh.Locality.REMOTE
-            self._call(lambda: declare(key_expr, on_sample, allowed_origin=remote))
+            self._call(
+                lambda: self._subscribers.update(
+                    {key_expr: declare(key_expr, on_sample, allowed_origin=remote)}
+                )
+            )
+
+    def unsubscribe(self, key_expr: str) -> None:
+        """Receive nothing more by that very subscription."""
+        self._check_open()
+        if self._subscribed.pop(key_expr, None) is not None:
+            self._call(lambda: self._subscribers.pop(key_expr).undeclare())
 
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token on ``key``."""
@@ -329,7 +341,9 @@ class ZenohBus:
     def _on_sample(self, key_expr: str, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.PUT and not self._closed:
             event = Sample(str(sample.key_expr), sample.payload.to_bytes())
-            self._inbox.offer_threadsafe(event, latest=self._subscribed[key_expr])
+            latest = self._subscribed.get(key_expr)
+            if latest is not None:
+                self._inbox.offer_threadsafe(event, latest=latest)
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)

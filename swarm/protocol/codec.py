@@ -77,7 +77,7 @@ from swarm.protocol.seal import (
     is_envelope,
     open_envelope,
 )
-from swarm.protocol.uav_messages import Calibration, Choice, Claim, Outcome, Status
+from swarm.protocol.uav_messages import Calibration, Choice, Claim, Nearby, Outcome, Status
 
 IN_SEALED_ANSWER: Final = 64
 """Arrays and maps of an answer in which all registers but the roster are envelopes."""
@@ -378,7 +378,7 @@ def _may_say(writer: str, body: Body) -> bool:
             return writer == OPERATOR
         case SignedRoster():
             return writer == AUTHORITY
-        case Claim() | Outcome() | Calibration() | Status() | Choice():
+        case Claim() | Outcome() | Calibration() | Status() | Choice() | Nearby():
             return writer not in (AUTHORITY, COORDINATOR, OPERATOR)
 
 

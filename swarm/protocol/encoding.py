@@ -49,6 +49,7 @@ from swarm.protocol.uav_messages import (
     ChoiceBasis,
     Claim,
     ClaimedWay,
+    Nearby,
     Outcome,
     Status,
 )
@@ -66,6 +67,7 @@ KINDS: Final[dict[str, type[Body]]] = {
     "calibration": Calibration,
     "status": Status,
     "choice": Choice,
+    "near": Nearby,
     "command": OperatorCommand,
     "task": TaskEdit,
     "start": StartWithout,

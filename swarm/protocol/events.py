@@ -103,6 +103,17 @@ class Ask:
     answers for."""
 
 
+Cell = tuple[int, int]
+"""Of the sky over a mission: how far to the east and to the north, in cells."""
+
+
+@dataclass(frozen=True, slots=True)
+class TuneIn:
+    """Hear what UAVs in these cells say to those near them, and in no others."""
+
+    cells: frozenset[Cell]
+
+
 @dataclass(frozen=True, slots=True)
 class Save:
     """Keep the core's `memory` where a new life of this process finds it."""
@@ -123,4 +134,4 @@ class Finish:
     status: int
 
 
-CommonAction = Publish | PublishLast | Ask | Save | LogLine | Finish
+CommonAction = Publish | PublishLast | Ask | TuneIn | Save | LogLine | Finish

@@ -104,6 +104,10 @@ class KeySpace:
         """Why a UAV took a task; ``*`` for all."""
         return f"{self.root}/uav/{uav}/choice"
 
+    def near(self, uav: str, east: int | str, north: int | str) -> str:
+        """Where a UAV in that cell of the sky is, for those near it; ``*`` for all."""
+        return f"{self.root}/uav/{uav}/near/{east}/{north}"
+
     def alive(self, writer: str) -> str:
         """Liveliness token of a process; ``*`` for all."""
         return f"{self.root}/alive/{writer}"
@@ -122,6 +126,8 @@ class KeySpace:
             case ["roster"]:
                 return AUTHORITY
             case ["uav", writer, _] | ["uav", writer, "outcome", _]:
+                return writer
+            case ["uav", writer, "near", _, _]:
                 return writer
             case _:
                 return None

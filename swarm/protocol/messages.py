@@ -49,7 +49,7 @@ from swarm.protocol.fields import (
     Words,
 )
 from swarm.protocol.key_space import KeySpace
-from swarm.protocol.uav_messages import Calibration, Choice, Claim, Outcome, Status
+from swarm.protocol.uav_messages import Calibration, Choice, Claim, Nearby, Outcome, Status
 
 SCHEMA_VERSION = 1
 """Grows only with what releases before cannot be mixed with; see swarm.protocol.codec."""
@@ -308,6 +308,7 @@ Body = (
     | Calibration
     | Status
     | Choice
+    | Nearby
     | OperatorCommand
     | TaskEdit
     | StartWithout
@@ -401,6 +402,8 @@ def _key_of(mission: str, writer: str, body: Body) -> str:
             return keys.status(writer)
         case Choice():
             return keys.choice(writer)
+        case Nearby(cell=(east, north)):
+            return keys.near(writer, east, north)
         case OperatorCommand(target=target):
             return keys.operator(target)
         case TaskEdit(task=task):

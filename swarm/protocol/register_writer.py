@@ -5,7 +5,7 @@ from __future__ import annotations
 from swarm.protocol.encoding import encode
 from swarm.protocol.fields import MAX_COUNT
 from swarm.protocol.messages import Body, Message, Stamp, as_heard
-from swarm.protocol.uav_messages import Choice, Status
+from swarm.protocol.uav_messages import News
 
 
 class RegisterWriter:
@@ -32,7 +32,7 @@ class RegisterWriter:
         elif incarnation < MAX_COUNT:
             self._stamp = Stamp(incarnation + 1, 1)
         message = Message(self.mission, self.writer, self._stamp, body)
-        return message if isinstance(body, Status | Choice) else as_heard(message, encode(message))
+        return message if isinstance(body, News) else as_heard(message, encode(message))
 
     def observe(self, heard: Stamp) -> bool:
         """Speak above ``heard``, which others remember of an earlier life of this writer.

@@ -32,7 +32,7 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.seal import open_envelope
 from swarm.protocol.sync import fingerprint
-from swarm.protocol.uav_messages import Calibration, Choice, Claim, Outcome, Status
+from swarm.protocol.uav_messages import Calibration, Claim, News, Outcome
 
 # A bus without keys lets anybody make names up: they must not cost memory without end.
 MOST_UNPOSTED: Final = 1000
@@ -117,10 +117,10 @@ class Replica:
         """By task id, the order that counts and the entry of the board made from it."""
 
     def join(self, message: Message) -> bool:
-        """Take ``message`` in; whether it was news. Status and choice are no registers."""
+        """Take ``message`` in; whether it was news. News is no register."""
         key = message.key
         known = self._registers.get(key)
-        if known is message or isinstance(message.body, Status | Choice):
+        if known is message or isinstance(message.body, News):
             return False
         if known is not None and not _beats(message, known):
             self.stale += message.stamp < known.stamp

@@ -120,6 +120,42 @@ def choice_id(uav: str, number: int) -> str:
     return f"{uav}-{number}"
 
 
+MOST_CORNERS_AHEAD = 4
+"""Of its way ahead a UAV tells those near it."""
+CellIndex = Annotated[int, Strict(), Ge(-(2**31)), Le(2**31)]
+Depth = Annotated[int, Strict(), Ge(0), Le(255)]
+Grade = Annotated[int, Strict(), Ge(0), Le(2)]
+
+
+@dataclass(frozen=True, slots=True)
+class Nearby(Checked):
+    """Key ``uav/<id>/near/<east>/<north>``: where a UAV is, for those near it; may be lost.
+
+    What follows from it is said in swarm.separation.
+    """
+
+    cell: tuple[CellIndex, CellIndex]
+    """Of the grid of the mission, counted from its origin to the east and to the north; where
+    the UAV is, or was last heard to be."""
+    airborne: Flag
+    """Whether it flies; if not, nobody need keep away from it, and it may be about to take off."""
+    position_enu_m: Point
+    """[m; mission origin, height included]."""
+    velocity_enu_m_s: Point
+    path_enu_m: Annotated[tuple[Point, ...], Len(0, MOST_CORNERS_AHEAD)]
+    """Where it is about to fly next, corner by corner [m; alike]; empty: it stops and stays."""
+    speed_m_s: Speed
+    """At which it flies that."""
+    grade: Grade
+    """How much it may be asked to give way: 0 not at all, 2 the most."""
+    rank: Count
+    """Among those of its grade, from its place in the priority sequence."""
+    depth: Depth
+    """0: its own precedence; else it makes room for one of depth - 1."""
+    said_s: Instant | None
+    """Mission time [s]; None before it is known."""
+
+
 MOST_REASONS = 20
 """Reasons of which one status tells."""
 
@@ -319,3 +355,7 @@ class Status(Checked):
             return None
         east_m, north_m, up_m = self.position_enu_m
         return east_m, north_m, up_m + (layer_m if self.layer_m is None else self.layer_m)
+
+
+News = Status | Choice | Nearby
+"""What is no register: said once, kept by nobody, and may be lost."""

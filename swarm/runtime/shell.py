@@ -20,6 +20,7 @@ from swarm.bus.port import Bus, BusEvent, LinkDown, LinkUp, Query, Sample, Token
 from swarm.protocol.codec import Codec
 from swarm.protocol.events import (
     Ask,
+    Cell,
     CommonEvent,
     Finish,
     KeysReplaced,
@@ -34,6 +35,7 @@ from swarm.protocol.events import (
     SnapshotsReceived,
     Stop,
     Tick,
+    TuneIn,
 )
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import (
@@ -47,7 +49,7 @@ from swarm.protocol.messages import (
 from swarm.protocol.registers import NO_ROOM
 from swarm.protocol.seal import Seal
 from swarm.protocol.timing import PRESETS, LinkKind
-from swarm.protocol.uav_messages import Choice, Status
+from swarm.protocol.uav_messages import News
 from swarm.runtime.clock import Clock
 from swarm.runtime.log import get_logger
 from swarm.runtime.state_exchange import StateExchange, draw_nonce
@@ -152,6 +154,8 @@ class Shell(Generic[E, A]):
         self._events: deque[E] = deque()
         self._busy = False
         self._told_newer: set[str] = set()
+        self._cells: frozenset[Cell] = frozenset()
+        """Of the sky, whose traffic is heard."""
         self._briefed: Stamp | None = None
         """Of the newest brief that was heard."""
         self._counted: Counter[str] = Counter()
@@ -267,6 +271,8 @@ class Shell(Generic[E, A]):
             case Save():
                 if self._save is not None:
                     self._save(self._clock.now_s())
+            case TuneIn(cells):
+                self._tune_in(cells)
             case LogLine(text, fields):
                 self._log.info(text, **{**self._context(), **fields})
             case Finish(status):
@@ -276,10 +282,18 @@ class Shell(Generic[E, A]):
                 self._execute(action)
 
     def _publish(self, message: Message) -> None:
-        reliable = not isinstance(message.body, Status | Choice)
+        reliable = not isinstance(message.body, News)
         packed = self._codec.pack(message)
         if packed is not None:
             self._bus.publish(message.key, packed, reliable=reliable)
+
+    def _tune_in(self, cells: frozenset[Cell]) -> None:
+        """Hear what is said in these cells, of each UAV the newest, and in no others."""
+        for east, north in sorted(cells - self._cells):
+            self._bus.subscribe(self._keys.near("*", east, north), latest=True)
+        for east, north in sorted(self._cells - cells):
+            self._bus.unsubscribe(self._keys.near("*", east, north))
+        self._cells = cells
 
     def _reschedule(self) -> None:
         if self._timer is not None:

@@ -93,6 +93,29 @@ def test_only_what_matches_is_delivered(seats: Seats) -> None:
     run(seats, scenario)
 
 
+def test_who_has_unsubscribed_hears_nothing_more(seats: Seats) -> None:
+    async def scenario(join: Join) -> None:
+        a, reader = [Reader(await join()) for _ in range(2)]
+        for key_expr in ("m/*/near/1/2", "m/*/near/1/3", "end"):
+            reader.bus.subscribe(key_expr)
+        await settle(a, reader)
+        reader.bus.unsubscribe("m/*/near/1/2")
+        reader.bus.unsubscribe("m/nobody/subscribed")
+        await settle(a, reader)
+
+        for key in ("m/u1/near/1/2", "m/u1/near/1/3", "end"):
+            a.bus.publish(key, b"")
+        await reader.until_event(Sample("end", b""))
+        assert [sample.key for sample in reader.of(Sample)] == ["m/u1/near/1/3", "end"]
+
+        reader.bus.subscribe("m/*/near/1/2")
+        await settle(a, reader)
+        a.bus.publish("m/u1/near/1/2", b"again")
+        await reader.until_event(Sample("m/u1/near/1/2", b"again"))
+
+    run(seats, scenario)
+
+
 def test_one_publishers_samples_keep_their_order(seats: Seats) -> None:
     async def scenario(join: Join) -> None:
         a, b = [Reader(await join()) for _ in range(2)]

@@ -39,6 +39,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import (
     Arrived,
+    GiveWay,
     GoTo,
     HandedOver,
     HandOverExplained,
@@ -182,6 +183,9 @@ class BridgeWatch:
             self._note(event)
         elif isinstance(event, KeepOut):
             self._zones.tell(event)
+        elif isinstance(event, GiveWay):
+            places_m = (*self._task.places_m[-_PLACES:], *event.path_enu_m)
+            self._task = replace(self._task, places_m=places_m)
         elif isinstance(event, Ready):
             let = before is FlightPhase.STANDING and event.leg == self._swap_leg
             self._may_start |= let

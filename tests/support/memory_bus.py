@@ -242,6 +242,11 @@ class MemoryBus:
         self._check_open()
         self._seat.subscribed[check_key_expr(key_expr)] = latest
 
+    def unsubscribe(self, key_expr: str) -> None:
+        """See `swarm.bus.port.Bus`."""
+        self._check_open()
+        self._seat.subscribed.pop(check_key_expr(key_expr), None)
+
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token on ``key``."""
         self._check_open()

@@ -25,6 +25,7 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.uav_messages import (
     MAX_CANDIDATES,
+    MOST_CORNERS_AHEAD,
     AttemptResult,
     BaseStage,
     Calibration,
@@ -33,6 +34,7 @@ from swarm.protocol.uav_messages import (
     ChoiceBasis,
     Claim,
     ClaimPhase,
+    Nearby,
     Outcome,
     Status,
     StatusPhase,
@@ -304,7 +306,20 @@ calibrations = st.builds(
     speed_m_s=st.none() | st.floats(1e-6, 1e6),
 )
 by_coordinator = briefs | epochs | boards
-by_uav = claims | outcomes | calibrations | statuses | choices
+nearbys = st.builds(
+    Nearby,
+    st.tuples(st.integers(-(2**31), 2**31), st.integers(-(2**31), 2**31)),
+    st.booleans(),
+    points,
+    points,
+    st.lists(points, max_size=MOST_CORNERS_AHEAD).map(tuple),
+    st.floats(1e-6, 1e6),
+    st.integers(0, 2),
+    counts,
+    st.integers(0, 255),
+    st.none() | numbers,
+)
+by_uav = claims | outcomes | calibrations | statuses | choices | nearbys
 by_operator = commands | task_orders | starts | zone_edits | readies
 
 

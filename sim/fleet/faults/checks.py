@@ -14,7 +14,7 @@ from sim.fleet.faults.recorder import BusEntry
 from swarm.protocol.board import TaskBoard, TaskState
 from swarm.protocol.messages import Message
 from swarm.protocol.registers import Replica
-from swarm.protocol.uav_messages import Choice, Claim, Status
+from swarm.protocol.uav_messages import Choice, Claim, Nearby, Status
 
 AGREE_WITHIN_S = 5.0
 """After the end of a trouble, living UAVs have this long to agree on all claims [s]."""
@@ -145,7 +145,7 @@ def _claims(
         match each:
             case ProcessDown(writer=writer):
                 claims.pop(writer, None)
-            case BusEntry(what=Message(body=Status() | Choice())):
+            case BusEntry(what=Message(body=Status() | Choice() | Nearby())):
                 continue
             case BusEntry(what=message):
                 news = replica.join(message)

@@ -48,6 +48,7 @@ SAYINGS = {
         KEYS.board("t1"),
         *(key(uav) for uav in ("uav1", "uav2") for key in (KEYS.claim, KEYS.status, KEYS.choice)),
         *(KEYS.outcome(uav, "t1") for uav in ("uav1", "uav2")),
+        *(KEYS.near(uav, 0, -1) for uav in ("uav1", "uav2")),
         KEYS.operator("uav1"),
         KEYS.operator("fleet"),
         KEYS.operator_task("t1"),

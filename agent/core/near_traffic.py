@@ -1,0 +1,348 @@
+"""Keeps one UAV's vehicle apart from others that it hears near it, whatever has been planned.
+
+Stands between the core and the vehicle: it hears what the vehicle tells and what it is ordered,
+says where the vehicle is to those in the cells of the sky around, hears them, and lets it give way
+(swarm.separation.tactical). What the vehicle was ordered stays its order; it goes on by itself once
+there is room. In a mission without a separation, and with vehicles of the simulator's ideal world,
+nothing of this is met. Leaves out: what is planned so that it is not needed (agent.core.airway).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+from agent.core.context import AgentContext, AgentPart
+from agent.core.interface import (
+    Arrived,
+    Event,
+    GiveWay,
+    GoTo,
+    Hold,
+    Home,
+    KeepOut,
+    Landed,
+    OrderVehicle,
+    Prepare,
+    Ready,
+    Return,
+    Swap,
+    Telemetry,
+    VehicleOrder,
+)
+from agent.core.states import AgentState
+from swarm.protocol.board import ranks
+from swarm.protocol.events import Cell, TuneIn
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import Message, MissionConfig, Stamp
+from swarm.protocol.timing import earliest
+from swarm.protocol.uav_messages import MOST_CORNERS_AHEAD, Nearby
+from swarm.separation.tactical import Advice, Maneuver, OwnFlight, TacticalResolver
+from swarm.separation.tactical_rules import cell_around, cell_m, cells_near, rules_of
+from swarm.separation.tactical_traffic import (
+    Grade,
+    Precedence,
+    TrafficPicture,
+    TrafficRules,
+    TrafficWord,
+)
+
+BEACON_S = 1.0
+"""Between two words of a UAV with nobody near it."""
+_ALOFT_M = 1.0
+"""Who is that far above where it started flies."""
+_LIKELY_AGE_S = 0.2
+"""Of a word, as long as nobody knows the mission's time."""
+_OLD_S = 10.0
+"""Words that are older, or as far in the future, are somebody else's repeating."""
+_FLOWN_M = 6.0
+"""A corner of its way that near counts as flown; vehicles cut them."""
+_STEERED = frozenset(
+    {
+        AgentState.IDLE,
+        AgentState.FLYING,
+        AgentState.SERVING,
+        AgentState.FLYING_TO_BASE,
+        AgentState.ABOVE_BASE,
+        AgentState.RETURNING_VIA_START,
+    }
+)
+"""In these its vehicle takes targets, and may be told to give way."""
+_BY_ITSELF = GiveWay()
+
+
+class NearTraffic(AgentPart):
+    """What one UAV does about others near it.
+
+    Args:
+        is_flown: whether the vehicle is one of those that are not quite where they are told.
+    """
+
+    def __init__(self, context: AgentContext, *, is_flown: bool) -> None:
+        super().__init__(context)
+        self._is_flown = is_flown
+        self.when_disturbed: Callable[[], None] = lambda: None
+        """Is told when the vehicle no longer flies as it was ordered."""
+        self._brief: MissionConfig | None = None
+        self._rules: TrafficRules | None = None
+        self._resolver: TacticalResolver | None = None
+        self._picture: TrafficPicture | None = None
+        self._cell_m = 1.0
+        self._telemetry: Telemetry | None = None
+        self._way: tuple[Point, ...] = ()
+        """Of the last order, from where the vehicle was on."""
+        self._landed = False
+        self._held = False
+        """Whether the last order was to stop it, or to bring it home or down at once."""
+        self._told = _BY_ITSELF
+        self._cells: frozenset[Cell] = frozenset()
+        self._centre: Cell | None = None
+        self._stamps: dict[str, Stamp] = {}
+        self._ordered = False
+        """Whether it was ordered something since the last decision."""
+        self._decide_at_s = -math.inf
+        self._say_at_s = -math.inf
+
+    # -- what it hears ------------------------------------------------------------------
+
+    def sense(self, event: Event) -> None:
+        """What the vehicle says, before anybody else hears it."""
+        match event:
+            case Telemetry():
+                self._telemetry = event
+            case Landed() | Home():
+                self._landed, self._way = True, ()
+            case Arrived() if self._told == _BY_ITSELF:
+                self._way = self._way[-1:]
+            case _:
+                pass
+
+    def hear(self, message: Message, now_s: float) -> None:
+        """Another UAV says where it is."""
+        body, writer = message.body, message.writer
+        known = self._stamps.get(writer)
+        if (
+            not isinstance(body, Nearby)
+            or writer == self._uav
+            or self._picture is None
+            or (known is not None and message.stamp <= known)
+            or not self._is_in_brief(writer)
+        ):
+            return
+        age_s = self._age_s(body.said_s, now_s)
+        if age_s is None:
+            return
+        self._stamps[writer] = message.stamp
+        if not body.airborne:
+            self._picture.forget(writer)
+            return
+        word = TrafficWord(
+            body.position_enu_m,
+            body.velocity_enu_m_s,
+            body.path_enu_m,
+            body.speed_m_s,
+            Precedence(Grade(body.grade), body.rank, body.depth),
+        )
+        self._picture.hear(writer, word, now_s, age_s)
+
+    def _age_s(self, said_s: float | None, now_s: float) -> float | None:
+        """How old a word is, as far as the time of the mission tells; None: not of now."""
+        mission_s = self._mission_view.clock.mission_s(now_s)
+        if said_s is None or mission_s is None:
+            return _LIKELY_AGE_S
+        age_s = mission_s - said_s
+        return max(0.0, age_s) if abs(age_s) <= _OLD_S else None
+
+    def _is_in_brief(self, uav: str) -> bool:
+        brief = self._replica.brief
+        return brief is not None and any(uav == each.id for each in brief.uavs)
+
+    # -- what follows ---------------------------------------------------------------------
+
+    def settle(self, now_s: float) -> None:
+        """Heed what the vehicle is ordered in this step, decide, and say where it is, if due."""
+        for action in self._actions:
+            if isinstance(action, OrderVehicle):
+                self._heed(action.order)
+        if not self._heed_brief() or self._telemetry is None:
+            return
+        if not (self._ordered or now_s >= min(self._decide_at_s, self._say_at_s)):
+            return
+        own, aloft = self._own(self._telemetry), self._is_aloft(self._telemetry)
+        self._tune_in(own.position_enu_m)
+        if self._ordered or now_s >= self._decide_at_s:
+            self._decide_at_s = now_s + BEACON_S
+            if aloft:
+                self._decide(own, now_s)
+        self._ordered = False
+        self._tell(own, aloft=aloft, now_s=now_s)
+
+    def next_deadline_s(self) -> float | None:
+        """When `settle` will next have something to do."""
+        if self._rules is None or self._telemetry is None or not self._machine.acts:
+            return None
+        return earliest(self._decide_at_s, self._say_at_s)
+
+    def _heed(self, order: VehicleOrder) -> None:
+        place = () if self._telemetry is None else (self._telemetry.position_enu_m,)
+        match order:
+            case GoTo(position_enu_m=end, via_enu_m=via):
+                self._way, self._held, self._landed = (*place, *via, end), False, False
+            case Return(via_enu_m=None):
+                home = () if (me := self._mission_view.me) is None else (me.position_enu_m,)
+                self._way, self._held, self._told = (*place, *home), True, _BY_ITSELF
+            case Return(via_enu_m=end, path_enu_m=via) if end is not None:
+                self._way, self._held = (*place, *via, end), False
+            case Prepare(position_enu_m=end) | Swap(position_enu_m=end):
+                self._way, self._held, self._told = (*place, end), True, _BY_ITSELF
+                self._landed &= isinstance(order, Swap)
+            case Hold():
+                self._way, self._held, self._told = place, True, _BY_ITSELF
+            case Ready() | KeepOut() | GiveWay():
+                return
+        self._ordered = True
+
+    def _heed_brief(self) -> bool:
+        """Whether there is a distance to keep."""
+        brief = self._replica.brief
+        if brief is not self._brief:
+            self._brief = brief
+            rules = None if brief is None or not self._is_flown else rules_of(brief)
+            if rules != self._rules:
+                self._rules = rules
+                self._cell_m = 1.0 if rules is None else cell_m(rules)
+                self._resolver = None if rules is None else TacticalResolver(self._uav, rules)
+                heard_m = 0.9 * self._cell_m
+                self._picture = None if rules is None else TrafficPicture(rules, heard_m)
+        return self._rules is not None and self._mission_view.me is not None
+
+    # -- its own flight -----------------------------------------------------------------
+
+    def _is_aloft(self, telemetry: Telemetry) -> bool:
+        me = self._mission_view.me
+        if self._landed or me is None or self._mission_view.stands:
+            return False
+        return telemetry.position_enu_m[2] > me.position_enu_m[2] + _ALOFT_M
+
+    def _own(self, telemetry: Telemetry) -> OwnFlight:
+        me, state = self._mission_view.me, self._machine.state
+        path = self._ahead(telemetry.position_enu_m)
+        steered = state in _STEERED and not self._held
+        serves = state is AgentState.SERVING and not path
+        if not steered or serves:
+            grade = Grade.BOUND
+        else:
+            free = state is AgentState.IDLE and not path
+            grade = Grade.FREE if free else Grade.FLYING
+        return OwnFlight(
+            telemetry.position_enu_m,
+            telemetry.velocity_enu_m_s,
+            path,
+            1.0 if me is None else me.speed_m_s,
+            Precedence(grade, self._rank()),
+            steered and not serves,
+        )
+
+    def _rank(self) -> int:
+        brief, epoch = self._replica.brief, self._replica.epoch
+        fleet = [] if brief is None else [uav.id for uav in brief.uavs]
+        by_place = fleet.index(self._uav) if self._uav in fleet else len(fleet)
+        return by_place if epoch is None else ranks(epoch.sequence, fleet).get(self._uav, by_place)
+
+    def _ahead(self, place: Point) -> tuple[Point, ...]:
+        """What is left of its way."""
+        way = self._way
+        while len(way) > 2 and _is_past(place, way):
+            way = way[1:]
+        self._way = way
+        if len(way) < 2 or math.dist(place, way[-1]) < _STANDS_M:
+            return ()
+        return way[1:]
+
+    def _decide(self, own: OwnFlight, now_s: float) -> None:
+        rules, resolver, picture = self._rules, self._resolver, self._picture
+        if rules is None or resolver is None or picture is None:
+            return
+        before, advice = resolver.advice, resolver.decide(own, picture, now_s)
+        self._decide_at_s = now_s + (rules.tick_s if picture.is_busy else BEACON_S / 2.0)
+        if not own.gives_way:
+            return
+        wanted = _order_of(advice)
+        if wanted != self._told:
+            if self._told == _BY_ITSELF:
+                self.when_disturbed()
+            self._told = wanted
+            self._actions.append(OrderVehicle(wanted))
+        if (advice.maneuver, advice.braked) != (before.maneuver, before.braked):
+            self._explain(advice)
+
+    def _explain(self, advice: Advice) -> None:
+        if advice.maneuver is Maneuver.KEEP and not advice.braked:
+            self._log("goes on: there is room again")
+        else:
+            what = "brakes" if advice.braked else advice.maneuver.value
+            self._log("gives way", to=advice.because_of, by=what)
+
+    # -- what it says -------------------------------------------------------------------
+
+    def _tune_in(self, place: Point) -> None:
+        """Hear those in the cells around, which are left with hysteresis."""
+        self._centre = cell_around(place, self._cell_m, self._centre)
+        cells = cells_near(self._centre)
+        if cells != self._cells:
+            self._cells = cells
+            self._actions.append(TuneIn(cells))
+
+    def _tell(self, own: OwnFlight, *, aloft: bool, now_s: float) -> None:
+        resolver, picture, rules = self._resolver, self._picture, self._rules
+        if now_s < self._say_at_s or resolver is None or picture is None or rules is None:
+            return
+        busy = picture.is_busy and aloft
+        self._say_at_s = now_s + (rules.tick_s if busy else BEACON_S)
+        word = resolver.word(own)
+        place = word.position_enu_m
+        self._say(
+            Nearby(
+                (math.floor(place[0] / self._cell_m), math.floor(place[1] / self._cell_m)),
+                aloft,
+                place,
+                word.velocity_enu_m_s,
+                word.path_enu_m[:MOST_CORNERS_AHEAD],
+                word.speed_m_s,
+                int(word.precedence.grade),
+                word.precedence.rank,
+                word.precedence.depth,
+                self._mission_view.clock.mission_s(now_s),
+            )
+        )
+
+
+_STANDS_M = 2.0
+"""Who is that near the end of its way has no way left."""
+
+
+def _is_past(place: Point, way: Sequence[Point]) -> bool:
+    """Whether the first piece of a way is behind a UAV there, which cuts corners."""
+    here, corner, after = way[0], way[1], way[2]
+    if math.dist(place, corner) <= _FLOWN_M:
+        return True
+    return _off(place, corner, after) + 1.0 < _off(place, here, corner)
+
+
+def _off(place: Point, begin: Point, end: Point) -> float:
+    """Distance of a place from a straight piece [m]."""
+    along = [b - a for a, b in zip(begin, end, strict=True)]
+    away = [p - a for a, p in zip(begin, place, strict=True)]
+    length2 = sum(each * each for each in along)
+    if length2 <= 0.0:
+        return math.dist(place, begin)
+    share = sum(a * b for a, b in zip(along, away, strict=True)) / length2
+    share = min(1.0, max(0.0, share))
+    return math.dist(place, [a + share * d for a, d in zip(begin, along, strict=True)])
+
+
+def _order_of(advice: Advice) -> GiveWay:
+    """What the vehicle is told."""
+    if advice.stands:
+        return GiveWay(stands=True)
+    return GiveWay(advice.path_enu_m, speed_m_s=advice.speed_m_s)

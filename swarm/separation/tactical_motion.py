@@ -1,0 +1,155 @@
+"""How a UAV may move in the next seconds: driven along its path for a while, then braked to rest.
+
+Sampled motions of a point that speeds up and brakes evenly, climbs no faster than it may, and stops
+at the end of its path. Leaves out: wind, and how a real autopilot bends corners.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+FloatArray = npt.NDArray[np.float64]
+Place = tuple[float, float, float]
+"""[m; mission origin, height included]."""
+
+STEP_S = 0.25
+"""Between two samples of a motion [s]."""
+_REACHED_M = 0.5
+
+
+@dataclass(frozen=True, slots=True)
+class Agility:
+    """How the UAVs of a fleet speed up, brake and climb; as slow as the slowest of them.
+
+    Raises:
+        ValueError: a number is not positive.
+    """
+
+    acceleration_m_s2: float = 1.5
+    """To speed up and to brake with: PX4 brakes at 1.6, ArduCopter at 2.5 [m/s²]."""
+    climb_m_s: float = 1.5
+    """Up and down, whatever the cruise speed [m/s]."""
+
+    def __post_init__(self) -> None:
+        for name in ("acceleration_m_s2", "climb_m_s"):
+            if not getattr(self, name) > 0.0:
+                raise ValueError(f"{name} must be > 0, not {getattr(self, name)}")
+
+    def stop_m(self, speed_m_s: float) -> float:
+        """Braking distance from that speed [m]."""
+        return speed_m_s**2 / (2.0 * self.acceleration_m_s2)
+
+
+def motion_m(
+    position_m: Place,
+    velocity_m_s: Place,
+    path_m: Sequence[Place],
+    speed_m_s: float,
+    agility: Agility,
+    drive_s: float,
+    span_s: float,
+) -> FloatArray:
+    """Places of a UAV at 0, `STEP_S`, … until ``span_s``.
+
+    Args:
+        position_m: where it is.
+        velocity_m_s: how it moves.
+        path_m: corners to fly through, the last to stop at; empty: it brakes at once.
+        speed_m_s: cruise speed.
+        agility: how it speeds up, brakes and climbs.
+        drive_s: after that it brakes, wherever it is.
+        span_s: until when.
+
+    Returns:
+        Shape (samples, 3) [m].
+    """
+    (px, py, pz), (vx, vy, vz) = position_m, velocity_m_s
+    change_m_s = agility.acceleration_m_s2 * STEP_S
+    corner, last = 0, len(path_m) - 1
+    places = [(px, py, pz)]
+    for step in range(math.ceil(span_s / STEP_S)):
+        wx = wy = wz = 0.0
+        if step * STEP_S < drive_s and path_m:
+            tx, ty, tz = path_m[corner]
+            away_m = math.sqrt((tx - px) ** 2 + (ty - py) ** 2 + (tz - pz) ** 2)
+            near_m = max(_REACHED_M, STEP_S * math.sqrt(vx * vx + vy * vy + vz * vz))
+            while corner < last and away_m <= near_m:
+                corner += 1
+                tx, ty, tz = path_m[corner]
+                away_m = math.sqrt((tx - px) ** 2 + (ty - py) ** 2 + (tz - pz) ** 2)
+            if away_m > 1e-6:
+                pace_m_s = speed_m_s
+                if corner == last:
+                    slowing_m_s = math.sqrt(2.0 * agility.acceleration_m_s2 * away_m)
+                    pace_m_s = min(pace_m_s, slowing_m_s, away_m / STEP_S)
+                if (steep_m := abs(tz - pz)) > 1e-6:
+                    pace_m_s = min(pace_m_s, agility.climb_m_s * away_m / steep_m)
+                share = pace_m_s / away_m
+                wx, wy, wz = share * (tx - px), share * (ty - py), share * (tz - pz)
+        ax, ay, az = wx - vx, wy - vy, wz - vz
+        wanted_m_s = math.sqrt(ax * ax + ay * ay + az * az)
+        if wanted_m_s > change_m_s:
+            share = change_m_s / wanted_m_s
+            ax, ay, az = share * ax, share * ay, share * az
+        # The mean of the speeds before and after, as it changes evenly.
+        px += STEP_S * (vx + 0.5 * ax)
+        py += STEP_S * (vy + 0.5 * ay)
+        pz += STEP_S * (vz + 0.5 * az)
+        vx, vy, vz = vx + ax, vy + ay, vz + az
+        places.append((px, py, pz))
+    return np.array(places)
+
+
+def stray_m(age_s: float, speed_m_s: float, agility: Agility) -> tuple[float, float]:
+    """How far from its told way a UAV may stop at most, that long after it told it.
+
+    It may have turned, sped up or braked at once, with all its acceleration, and is stopped by the
+    same acceleration when it notices. Up and down it stops by itself, however fast it flies.
+
+    Returns:
+        Beside and along its way, and above and below it [m].
+    """
+    change_m_s = agility.acceleration_m_s2 * age_s
+    flown_m = 0.5 * agility.acceleration_m_s2 * age_s**2
+    # A change of speed across the flight moves where it stops by the time that stopping takes.
+    flat_m = flown_m + change_m_s * (speed_m_s + change_m_s) / (2.0 * agility.acceleration_m_s2)
+    rise_m_s = min(change_m_s, agility.climb_m_s)
+    upright_m = min(flown_m, rise_m_s * age_s) + agility.stop_m(rise_m_s)
+    return flat_m, upright_m
+
+
+def least_distance_m(
+    some_m: FloatArray, others_m: FloatArray, stray_m: tuple[float, float] = (0.0, 0.0)
+) -> float:
+    """Between any place of the one and any of the other [m].
+
+    Args:
+        some_m: (n, 3).
+        others_m: (m, 3).
+        stray_m: how far from these places the others may be, flat and upright.
+    """
+    apart_m = some_m[:, None, :] - others_m[None, :, :]
+    flat_m = np.hypot(apart_m[..., 0], apart_m[..., 1])
+    upright_m = np.abs(apart_m[..., 2])
+    if any(stray_m):
+        flat_m = np.maximum(0.0, flat_m - stray_m[0])
+        upright_m = np.maximum(0.0, upright_m - stray_m[1])
+    return float(np.min(np.hypot(flat_m, upright_m)))
+
+
+def least_meeting_m(some_m: FloatArray, others_m: FloatArray) -> float:
+    """Between places of the same moment [m]; both of shape (samples, 3).
+
+    Between two samples both are taken to move evenly, so that nobody slips through.
+    """
+    apart_m = some_m - others_m
+    steps_m = np.diff(apart_m, axis=0)
+    length2 = np.maximum(np.einsum("ij,ij->i", steps_m, steps_m), 1e-12)
+    share = np.clip(-np.einsum("ij,ij->i", apart_m[:-1], steps_m) / length2, 0.0, 1.0)
+    nearest_m = apart_m[:-1] + share[:, None] * steps_m
+    return float(np.sqrt(np.min(np.einsum("ij,ij->i", nearest_m, nearest_m))))

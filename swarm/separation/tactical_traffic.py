@@ -1,0 +1,297 @@
+"""What one UAV knows of those near it: their last words, how old these are, how far they count.
+
+A word ages: who is not heard is taken to have gone on as it said, or otherwise by as much as it can
+have since. A word that contradicts the one before it, by a jump that no UAV can fly, counts for
+less; who keeps another one from flying for too long, by moving about in its way, is not believed
+for a while. Leaves out: what follows (swarm.separation.tactical) and the bus.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+from swarm.separation.tactical_motion import (
+    STEP_S,
+    Agility,
+    FloatArray,
+    Place,
+    motion_m,
+    stray_m,
+)
+
+
+class Grade(IntEnum):
+    """How much a UAV may be asked to give way; the lower goes first."""
+
+    BOUND = 0
+    """It can't or must not: serving, landing, climbing, stopped by its operator."""
+    FLYING = 1
+    FREE = 2
+    """It hovers with nothing to do."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Precedence:
+    """Who gives way to whom: the greater to the smaller, at equal ones the greater id."""
+
+    grade: Grade
+    rank: int
+    """Of the priority sequence."""
+    depth: int = 0
+    """0: its own; else it makes room for one of depth - 1, and goes before all others as that one
+    does."""
+
+    @property
+    def of_who_makes_room(self) -> Precedence:
+        """Of a UAV that makes room for one of this precedence."""
+        return Precedence(self.grade, self.rank, min(self.depth + 1, MOST_DEPTH))
+
+
+MOST_DEPTH = 255
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficWord:
+    """What a UAV in the air says of itself to those near it."""
+
+    position_enu_m: Place
+    velocity_enu_m_s: Place
+    path_enu_m: tuple[Place, ...]
+    """Where it is about to fly next, corner by corner; empty: it stops and stays."""
+    speed_m_s: float
+    """At which it flies that."""
+    precedence: Precedence
+
+
+@dataclass(frozen=True, slots=True)
+class TrafficRules:
+    """By what the UAVs of a fleet keep apart; the same for all of them.
+
+    Raises:
+        ValueError: a number is out of range.
+    """
+
+    separation_m: float
+    """Least distance of two UAVs in flight."""
+    cruise_m_s: float
+    """Of the fastest of them."""
+    agility: Agility = field(default_factory=Agility)
+    position_error_m: float = 1.0
+    """A place that is told is no farther from the true one."""
+    reaction_s: float = 0.8
+    """From a decision until the vehicle does it, at the most."""
+    tick_s: float = 0.25
+    """Between two decisions, at the most, and between two words while somebody is near."""
+    low_m: float = -math.inf
+    """No UAV gives way to below this height [m; mission origin]."""
+    high_m: float = math.inf
+    """Nor to above this one."""
+
+    def __post_init__(self) -> None:
+        for name in ("separation_m", "cruise_m_s", "reaction_s", "tick_s"):
+            if not 0.0 < getattr(self, name) < math.inf:
+                raise ValueError(f"{name} must be > 0 and finite, not {getattr(self, name)}")
+        if not 0.0 <= self.position_error_m < math.inf:
+            raise ValueError(f"position_error_m must be >= 0, not {self.position_error_m}")
+
+    @property
+    def apart_m(self) -> float:
+        """Who gives way sees that it passes no nearer than that."""
+        return self.separation_m + _ROOM_M
+
+    @property
+    def aside_m(self) -> float:
+        """So far it moves out of a way, up, down or to a side: to the next layer."""
+        return self.separation_m + max(_LEAST_ASIDE_M, 2.0 * self.position_error_m)
+
+    @property
+    def horizon_s(self) -> float:
+        """So far ahead it is looked: long enough to stop, and a little more."""
+        return self.reaction_s + self.cruise_m_s / self.agility.acceleration_m_s2 + _AHEAD_S
+
+    @property
+    def reach_m(self) -> float:
+        """Nobody farther away matters within the horizon."""
+        return 2.0 * self.cruise_m_s * self.horizon_s + self.apart_m
+
+
+_ROOM_M = 1.0
+_LEAST_ASIDE_M = 2.0
+_AHEAD_S = 4.0
+
+SILENT_S = 3.0
+"""Who has said nothing for so long is not expected to give way, nor to have turned meanwhile: the
+next words of a turn get lost together less than once in 10^8 turns at 20 % loss."""
+FORGET_S = 60.0
+"""From then on only what it has claimed keeps others off its way."""
+_STANDS_M = 5.0
+"""Who moves about less stands."""
+_IMPLAUSIBLE_S = 10.0
+_JUMP_ROOM_M = 5.0
+_LATE_S = 1.0
+"""A word may come so much later than the one before it."""
+_FAST = 1.5
+"""A UAV may be that many times as fast as the fastest is told to cruise, as with the wind."""
+PATIENCE_S = 60.0
+"""Who has kept a UAV from flying for so long, in all, by moving about, is not believed."""
+DISBELIEF_S = 300.0
+_FORGIVEN = 0.2
+"""Share of the time that is taken off what it has cost."""
+
+
+class Track:
+    """One UAV near this one.
+
+    Args:
+        word: its first.
+        now_s: when that was heard, on the own clock.
+        age_s: how old it was.
+    """
+
+    def __init__(self, word: TrafficWord, now_s: float, age_s: float) -> None:
+        self.word = word
+        self.said_s = now_s - age_s
+        """When the last word was said, on the own clock [s]."""
+        self.cost_s = 0.0
+        """For how long it has kept this UAV from flying, less what is forgiven."""
+        self._counted_s = now_s
+        self._stood_at_m = word.position_enu_m
+        self._moved = False
+        """Whether it has been seen to move since it last cost nothing."""
+        self._implausible_until_s = -math.inf
+        self._disbelieved_until_s = -math.inf
+
+    def hear(self, word: TrafficWord, now_s: float, age_s: float, rules: TrafficRules) -> None:
+        """It says so now."""
+        passed_s = max(0.0, now_s - age_s - self.said_s) + _LATE_S
+        way_m = _FAST * rules.cruise_m_s * passed_s + 2.0 * rules.position_error_m + _JUMP_ROOM_M
+        if math.dist(word.position_enu_m, self.word.position_enu_m) > way_m:
+            self._implausible_until_s = now_s + _IMPLAUSIBLE_S
+        if math.dist(word.position_enu_m, self._stood_at_m) > _STANDS_M:
+            self._stood_at_m = word.position_enu_m
+            self._moved = True
+        self.word, self.said_s = word, now_s - age_s
+
+    def blame(self, now_s: float, seconds: float) -> None:
+        """It has kept this UAV from flying for so long; who only stands is not blamed."""
+        if not self._moved:
+            return
+        self.cost_s += seconds
+        if self.cost_s >= PATIENCE_S:
+            self.cost_s = 0.0
+            self._disbelieved_until_s = now_s + DISBELIEF_S
+
+    def forgive(self, now_s: float) -> None:
+        """Time passes."""
+        self.cost_s = max(0.0, self.cost_s - _FORGIVEN * (now_s - self._counted_s))
+        self._counted_s = now_s
+        if self.cost_s == 0.0 and math.hypot(*self.word.velocity_enu_m_s) < 0.5:
+            self._moved = False
+
+    def is_plausible(self, now_s: float) -> bool:
+        """Whether what it has said of late fits together."""
+        return now_s >= self._implausible_until_s
+
+    def is_believed(self, now_s: float) -> bool:
+        """Whether it counts at all."""
+        return now_s >= self._disbelieved_until_s
+
+    def is_silent(self, now_s: float) -> bool:
+        """Whether its words stay away."""
+        return now_s - self.said_s > SILENT_S
+
+    def expected_m(self, now_s: float, rules: TrafficRules) -> FloatArray:
+        """Where it will be at the times of `motion_m` until the horizon, if it does as it said."""
+        age_s = max(0.0, now_s - self.said_s)
+        word, span_s = self.word, age_s + rules.horizon_s
+        way_m = motion_m(
+            *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m),
+            word.speed_m_s,
+            rules.agility,
+            math.inf,
+            span_s,
+        )
+        samples = 1 + math.ceil(rules.horizon_s / STEP_S)
+        return way_m[-samples:]
+
+    def stops_m(self, now_s: float, rules: TrafficRules) -> tuple[FloatArray, tuple[float, float]]:
+        """Where it may be before it has stopped, however it decides until it hears more.
+
+        Returns:
+            Places along the way that it told, and how far from these it may be, see `stray_m`.
+        """
+        age_s, word = max(0.0, now_s - self.said_s), self.word
+        fast_m_s = max(word.speed_m_s, math.hypot(*word.velocity_enu_m_s))
+        drive_s = min(age_s, FORGET_S) + rules.reaction_s + rules.tick_s
+        way_m = motion_m(
+            *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m),
+            word.speed_m_s,
+            rules.agility,
+            drive_s,
+            drive_s + fast_m_s / rules.agility.acceleration_m_s2 + STEP_S,
+        )
+        speed_m_s = math.hypot(*word.velocity_enu_m_s)
+        return way_m, stray_m(min(age_s, SILENT_S), speed_m_s, rules.agility)
+
+
+class TrafficPicture:
+    """All whom one UAV has heard near it.
+
+    Args:
+        rules: of the fleet.
+        heard_m: who is nearer than that is heard, unless links fail.
+    """
+
+    def __init__(self, rules: TrafficRules, heard_m: float) -> None:
+        self._rules = rules
+        self._heard_m = heard_m
+        self._tracks: dict[str, Track] = {}
+
+    def hear(self, uav: str, word: TrafficWord, now_s: float, age_s: float) -> None:
+        """Another UAV says so of itself.
+
+        Args:
+            uav: which.
+            word: what it says.
+            now_s: now, on the own clock.
+            age_s: how old the word is, as far as that is known.
+        """
+        track = self._tracks.get(uav)
+        if track is None:
+            self._tracks[uav] = Track(word, now_s, age_s)
+        elif now_s - age_s >= track.said_s:
+            track.hear(word, now_s, age_s, self._rules)
+
+    @property
+    def is_busy(self) -> bool:
+        """Whether anybody may be near."""
+        return bool(self._tracks)
+
+    def forget(self, uav: str) -> None:
+        """It has landed."""
+        self._tracks.pop(uav, None)
+
+    def near(self, place_m: Place, now_s: float) -> Iterator[tuple[str, Track]]:
+        """Those who matter to a UAV at that place, in the order of their ids."""
+        for uav, track in sorted(self._tracks.items()):
+            track.forgive(now_s)
+            age_s = now_s - track.said_s
+            if age_s > FORGET_S:
+                del self._tracks[uav]
+                continue
+            if not track.is_believed(now_s):
+                continue
+            away_m = math.dist(place_m, track.word.position_enu_m)
+            if away_m <= self._rules.reach_m + _FAST * self._rules.cruise_m_s * age_s:
+                if track.is_silent(now_s) and self._has_left(track, place_m, now_s):
+                    del self._tracks[uav]
+                    continue
+                yield uav, track
+
+    def _has_left(self, track: Track, place_m: Place, now_s: float) -> bool:
+        """Whether it is no wonder that it is not heard: it has flown on, as it said."""
+        expected_m = track.expected_m(now_s, self._rules)[0]
+        return math.dist(place_m, expected_m.tolist()) > self._heard_m

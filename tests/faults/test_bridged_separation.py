@@ -1,0 +1,96 @@
+"""Vehicles whose ways meet keep their distance and all come home, on every firmware and style."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from agent.vehicle.config import CommandStyle
+from sim.autopilot.firmware import FirmwareModelName
+from sim.world.network import NetworkConditions
+from sim.world.rough_network import RoughNetwork
+from tests.support.bridged_crossings import (
+    SEPARATION_M,
+    CrossingFleet,
+    mission_of,
+    random_mission,
+)
+from tests.support.bridged_fleet import KINDS, ONE_DIAGONAL, OTHER_DIAGONAL
+from tests.support.seeds import seeds
+
+CROSSING = mission_of(((-80.0, 0.0), (80.0, 0.0)), ((0.0, -80.0), (0.0, 80.0)))
+HEAD_ON = mission_of(((-80.0, 0.0), (80.0, 0.0)), ((80.0, 0.0), (-80.0, 0.0)))
+
+
+@ONE_DIAGONAL
+def test_two_that_cross_keep_their_distance(
+    flavour: FirmwareModelName, style: CommandStyle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fleet = CrossingFleet(monkeypatch, flavour, style, CROSSING)
+
+    fleet.fly()
+
+    fleet.assert_all_done()
+    assert fleet.nearest_m >= SEPARATION_M, fleet.nearest
+    assert not fleet.made_room("u0") or not fleet.made_room("u0")[-1].stands
+    assert any(order.stands or order.path_enu_m for order in fleet.made_room("u1"))
+
+
+@OTHER_DIAGONAL
+def test_two_that_meet_head_on_pass_each_other(
+    flavour: FirmwareModelName, style: CommandStyle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fleet = CrossingFleet(monkeypatch, flavour, style, HEAD_ON)
+
+    fleet.fly()
+
+    fleet.assert_all_done()
+    assert fleet.nearest_m >= SEPARATION_M, fleet.nearest
+    assert any(order.path_enu_m for order in fleet.made_room("u1"))
+
+
+def test_without_giving_way_they_would_meet(monkeypatch: pytest.MonkeyPatch) -> None:
+    kind = (FirmwareModelName.ARDUPILOT, CommandStyle.REPOSITION)
+    fleet = CrossingFleet(monkeypatch, *kind, HEAD_ON, gives_way=False)
+
+    fleet.fly()
+
+    assert fleet.nearest_m < 1.0
+
+
+@pytest.mark.slow
+def test_eight_through_one_point_all_get_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    ways = []
+    for number in range(8):
+        east, north = (90.0 * f(number * math.pi / 4.0) for f in (math.cos, math.sin))
+        ways.append(((east, north), (-east, -north)))
+    kind = (FirmwareModelName.ARDUPILOT, CommandStyle.REPOSITION)
+    fleet = CrossingFleet(monkeypatch, *kind, mission_of(*ways))
+
+    fleet.fly(600.0)
+
+    fleet.assert_all_done()
+    assert fleet.nearest_m >= SEPARATION_M, fleet.nearest
+
+
+@pytest.mark.parametrize("seed", seeds(2, 200))
+def test_random_ways_with_lost_words(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    flavour, style = KINDS[seed % len(KINDS)]
+    conditions = NetworkConditions(loss_frac=0.05 * (seed % 5))
+    mission = random_mission(seed)
+    fleet = CrossingFleet(
+        monkeypatch,
+        flavour,
+        style,
+        mission,
+        seed=seed,
+        network=lambda queue: RoughNetwork(queue, conditions, seed),
+    )
+
+    fleet.fly(900.0)
+
+    result = fleet.world.mission_state.result()
+    told = "\n".join(fleet.told())
+    assert sorted(result.done) == sorted(task.id for task in mission.tasks), told
+    assert fleet.nearest_m >= SEPARATION_M - 1.0, fleet.nearest

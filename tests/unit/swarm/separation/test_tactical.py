@@ -1,0 +1,293 @@
+"""UAVs near each other keep apart and all arrive: by construction, in crowds, and among liars."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import shapely
+
+from swarm.separation.tactical import Maneuver, OwnFlight, TacticalResolver
+from swarm.separation.tactical_motion import Agility, Place
+from swarm.separation.tactical_traffic import (
+    DISBELIEF_S,
+    FORGET_S,
+    PATIENCE_S,
+    Grade,
+    Precedence,
+    TrafficPicture,
+    TrafficRules,
+    TrafficWord,
+)
+from tests.support.traffic_crowd import Crowd, Flyer, random_crowd
+
+RULES = TrafficRules(10.0, 8.0, low_m=10.0, high_m=100.0)
+UP_M = 30.0
+FIRST = Precedence(Grade.BOUND, 0)
+
+
+def at(east: float, north: float, up: float = UP_M) -> Place:
+    return east, north, up
+
+
+def flyer(uav: str, rank: int, *way: Place, speed_m_s: float = 8.0) -> Flyer:
+    return Flyer(uav, np.array(way[0]), list(way[1:]), speed_m_s, rank)
+
+
+def standing(uav: str, rank: int, place: Place, grade: Grade) -> Flyer:
+    return Flyer(uav, np.array(place), [], 8.0, rank, grade=grade, arrived_s=0.0)
+
+
+def star(count: int, radius_m: float) -> list[Flyer]:
+    flyers = []
+    for number in range(count):
+        angle = 2.0 * math.pi * number / count
+        east, north = radius_m * math.cos(angle), radius_m * math.sin(angle)
+        flyers.append(flyer(f"u{number}", number, at(east, north), at(-east, -north)))
+    return flyers
+
+
+CONSTRUCTED: dict[str, Callable[[], Sequence[Flyer]]] = {
+    "head-on": lambda: [
+        flyer("a", 0, at(0, 0), at(200, 0)),
+        flyer("b", 1, at(200, 0), at(0, 0)),
+    ],
+    "crossing": lambda: [
+        flyer("a", 1, at(0, 0), at(200, 0)),
+        flyer("b", 0, at(100, -100), at(100, 100)),
+    ],
+    "overtaking by who goes first": lambda: [
+        flyer("a", 0, at(0, 0), at(300, 0)),
+        flyer("b", 1, at(30, 0), at(320, 0), speed_m_s=3.0),
+    ],
+    "overtaking by who goes last": lambda: [
+        flyer("a", 1, at(0, 0), at(300, 0)),
+        flyer("b", 0, at(30, 0), at(280, 0), speed_m_s=3.0),
+    ],
+    "past one with nothing to do": lambda: [
+        flyer("a", 1, at(0, 0), at(200, 0)),
+        standing("b", 0, at(100, 0), Grade.FREE),
+    ],
+    "past one that must not move": lambda: [
+        flyer("a", 0, at(0, 0), at(200, 0)),
+        standing("b", 1, at(100, 0), Grade.BOUND),
+    ],
+    "each to where the other was": lambda: [
+        flyer("a", 0, at(0, 0), at(20, 0)),
+        flyer("b", 1, at(20, 0), at(0, 0)),
+    ],
+    "star of eight": lambda: star(8, 80.0),
+}
+
+
+@pytest.mark.parametrize("name", CONSTRUCTED)
+@pytest.mark.parametrize(("loss_frac", "delay_s"), [(0.0, 0.05), (0.2, 0.4)])
+def test_all_arrive_and_nobody_comes_too_near(name: str, loss_frac: float, delay_s: float) -> None:
+    flyers = CONSTRUCTED[name]()
+    crowd = Crowd(RULES, flyers, seed=3, loss_frac=loss_frac, delay_s=delay_s)
+
+    arrived = crowd.fly(300.0)
+
+    assert arrived, crowd.told()
+    least_m = RULES.separation_m - 2.0 * RULES.position_error_m
+    assert crowd.nearest_m >= least_m, crowd.told()
+
+
+def test_without_giving_way_they_would_collide() -> None:
+    crowd = Crowd(RULES, CONSTRUCTED["crossing"](), deaf=True)
+
+    crowd.fly(300.0)
+
+    assert crowd.nearest_m < 1.0
+
+
+def test_two_pass_a_gap_between_zones_one_above_the_other() -> None:
+    """It is too narrow for two side by side."""
+    walls = [shapely.box(90, 4, 110, 200), shapely.box(90, -200, 110, -4)]
+
+    def clear(path: Sequence[Place]) -> bool:
+        line = shapely.LineString([place[:2] for place in path])
+        return not any(line.distance(wall) < 1.0 for wall in walls)
+
+    flyers = CONSTRUCTED["head-on"]()
+    crowd = Crowd(RULES, flyers, clear=clear)
+
+    def look() -> None:
+        for each in flyers:
+            here = shapely.Point(each.place_m[:2])
+            assert not any(wall.contains(here) for wall in walls), crowd.told()
+
+    crowd.on_step = look
+
+    assert crowd.fly(300.0), crowd.told()
+    assert crowd.nearest_m >= RULES.separation_m - 2.0, crowd.told()
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(6), *(pytest.param(n, marks=pytest.mark.slow) for n in range(6, 60))]
+)
+def test_crowds_keep_apart_and_all_arrive(seed: int) -> None:
+    """2 to 10 UAVs in a small field, up to 20 % loss, words up to 0.6 s late, places 1 m off."""
+    crowd = random_crowd(seed)
+
+    arrived = crowd.fly(900.0)
+
+    assert arrived, crowd.told()
+    assert crowd.nearest_m >= crowd.rules.separation_m - 2.0, crowd.told()
+
+
+def test_one_that_falls_silent_in_the_way_is_flown_past() -> None:
+    first, other = CONSTRUCTED["head-on"]()
+    other.dies_s = 9.0  # its vehicle goes on to where it was told to go last
+    crowd = Crowd(RULES, [first, other])
+
+    assert crowd.fly(300.0), crowd.told()
+    assert first.arrived_s is not None
+    assert crowd.nearest_m >= RULES.separation_m - 2.0, crowd.told()
+
+
+@pytest.mark.parametrize("length_s", [2.0, 6.0])
+def test_who_hears_nothing_for_a_while_keeps_its_distance(length_s: float) -> None:
+    flyers = CONSTRUCTED["crossing"]()
+    for each in flyers:
+        each.deaf_s = (8.0, 8.0 + length_s)
+    crowd = Crowd(RULES, flyers)
+
+    assert crowd.fly(300.0), crowd.told()
+    assert crowd.nearest_m >= RULES.separation_m - 2.0, crowd.told()
+
+
+# -- who lies ----------------------------------------------------------------------------
+
+
+def jumping(crowd: Crowd) -> Iterator[tuple[str, TrafficWord]]:
+    """It says that it is somewhere else each time, right before one of the others."""
+    for number, each in enumerate(crowd.flyers):
+        if int(crowd.now_s * 4) % len(crowd.flyers) == number:
+            place = (each.place_m + 6.0 * np.array([1.0, 0.2, 0.0])).tolist()
+            yield "liar", TrafficWord(tuple(place), (0.0, 0.0, 0.0), (), 8.0, FIRST)
+
+
+def staying_before(uav: str) -> Callable[[Crowd], Iterator[tuple[str, TrafficWord]]]:
+    """It says that it flies along right before one of the others, wherever that turns to."""
+
+    def lie(crowd: Crowd) -> Iterator[tuple[str, TrafficWord]]:
+        each = next(each for each in crowd.flyers if each.uav == uav)
+        way = each.detour_m or each.path_m
+        aim = np.array(way[0]) - each.place_m if way else np.zeros(3)
+        ahead = aim / max(1.0, float(np.linalg.norm(aim)))
+        place = (each.place_m + 11.0 * ahead).tolist()
+        yield "liar", TrafficWord(tuple(place), (0.0, 0.0, 0.0), (), 8.0, FIRST)
+
+    return lie
+
+
+@pytest.mark.parametrize("lie", [jumping, staying_before("a")], ids=["jumping", "staying before"])
+def test_a_liar_neither_makes_others_collide_nor_stops_them_for_good(
+    lie: Callable[[Crowd], Iterator[tuple[str, TrafficWord]]],
+) -> None:
+    crowd = Crowd(RULES, CONSTRUCTED["crossing"](), liars=[lie])
+
+    arrived = crowd.fly(40.0 + 3.0 * PATIENCE_S)
+
+    assert arrived, crowd.told()
+    assert crowd.nearest_m >= RULES.separation_m - 2.0, crowd.told()
+
+
+def test_one_that_only_stands_is_never_disbelieved() -> None:
+    picture = TrafficPicture(RULES, 250.0)
+    resolver = TacticalResolver("a", TrafficRules(10.0, 8.0, low_m=29.0, high_m=31.0), no_way_round)
+    word = TrafficWord(at(20, 0), (0.0, 0.0, 0.0), (), 8.0, FIRST)
+    own = OwnFlight(at(0, 0), (0.0, 0.0, 0.0), (at(40, 0),), 8.0, Precedence(Grade.FLYING, 1))
+    for tick in range(int(4 * (PATIENCE_S + DISBELIEF_S))):
+        picture.hear("b", word, 0.25 * tick, 0.1)
+        advice = resolver.decide(own, picture, 0.25 * tick)
+
+    assert advice.stands
+    assert advice.because_of == "b"
+
+
+def no_way_round(_path: Sequence[Place]) -> bool:
+    return False
+
+
+# -- words -------------------------------------------------------------------------------
+
+
+def test_the_lower_rank_gives_way_and_the_higher_flies_on() -> None:
+    advice = {}
+    for me, other in (("a", "b"), ("b", "a")):
+        picture = TrafficPicture(RULES, 250.0)
+        picture.hear(other, word_of(other), 0.0, 0.1)
+        advice[me] = TacticalResolver(me, RULES).decide(own_of(me), picture, 0.0)
+
+    assert advice["a"].maneuver is Maneuver.KEEP
+    assert not advice["a"].braked
+    assert advice["b"].maneuver is not Maneuver.KEEP
+    assert advice["b"].because_of == "a"
+
+
+def own_of(uav: str) -> OwnFlight:
+    """Two that are going to meet in the middle in 10 s."""
+    side = 1.0 if uav == "a" else -1.0
+    rank = 0 if uav == "a" else 1
+    return OwnFlight(
+        at(-80.0 * side, 0.0),
+        (8.0 * side, 0.0, 0.0),
+        (at(200.0 * side, 0.0),),
+        8.0,
+        Precedence(Grade.FLYING, rank),
+    )
+
+
+def word_of(uav: str) -> TrafficWord:
+    return TacticalResolver(uav, RULES).word(own_of(uav))
+
+
+def test_who_makes_room_goes_before_all_that_the_other_goes_before() -> None:
+    lent = Precedence(Grade.FLYING, 3).of_who_makes_room
+
+    assert Precedence(Grade.FLYING, 3) < lent < Precedence(Grade.FLYING, 4)
+
+
+def test_words_out_of_order_change_nothing() -> None:
+    picture = TrafficPicture(RULES, 250.0)
+    picture.hear("b", word_of("b"), 1.0, 0.1)
+    picture.hear("b", word_of("a"), 1.1, 0.9)
+
+    ((_, track),) = picture.near(at(0, 0), 1.1)
+    assert track.word == word_of("b")
+
+
+def test_nobody_is_remembered_for_ever() -> None:
+    picture = TrafficPicture(RULES, 1e9)
+    picture.hear("b", word_of("b"), 0.0, 0.0)
+
+    assert list(picture.near(at(0, 0), FORGET_S - 1.0))
+    assert not list(picture.near(at(0, 0), FORGET_S + 1.0))
+    assert not picture.is_busy
+
+
+def test_who_has_flown_out_of_hearing_is_forgotten_and_who_stays_away_silent_is_not() -> None:
+    picture = TrafficPicture(RULES, 50.0)
+    picture.hear("leaves", word_of("a"), 0.0, 0.0)
+    stays = TrafficWord(at(-40, 0), (0.0, 0.0, 0.0), (), 8.0, FIRST)
+    picture.hear("stays", stays, 0.0, 0.0)
+
+    assert [uav for uav, _ in picture.near(at(-80, 0), 12.0)] == ["stays"]
+
+
+@pytest.mark.parametrize(
+    "fault", [{"separation_m": 0.0}, {"cruise_m_s": math.inf}, {"position_error_m": -1.0}]
+)
+def test_rules_out_of_range_are_refused(fault: dict[str, float]) -> None:
+    with pytest.raises(ValueError, match=next(iter(fault))):
+        replace(RULES, **fault)
+
+
+def test_agility_must_be_positive() -> None:
+    with pytest.raises(ValueError, match="climb_m_s"):
+        Agility(climb_m_s=0.0)
