@@ -28,6 +28,8 @@ from swarm.protocol.operator_commands import zones_in_force
 if TYPE_CHECKING:
     from swarm.allocation.legs.ground import Ground
 
+_SPOT_ROOM_M = 2.0
+"""Spots of a base are so much farther apart than UAVs in flight have to be [m]."""
 _AT_BASE_M = 25.0
 """Who is no farther from a base, or from its own spot there, is at it: agent.vehicle.standing."""
 
@@ -94,7 +96,11 @@ class Flights(AgentPart):
             self._spots, self._spots_of = {}, brief
         if base.id not in self._spots:
             fleet = [uav.id for uav in brief.uavs]
-            spot = self._verticals.spot(
+            verticals, least_m = self._verticals, brief.separation_m
+            if least_m is not None:  # nobody lands or takes off too near to anybody else there
+                apart_m = max(verticals.apart_m, least_m + _SPOT_ROOM_M)
+                verticals = replace(verticals, apart_m=apart_m)
+            spot = verticals.spot(
                 base.position_enu_m,
                 fleet.index(self._uav) if self._uav in fleet else 0,
                 [uav.position_enu_m for uav in brief.uavs],
@@ -212,10 +218,21 @@ class Flights(AgentPart):
                 None
                 if way is None
                 else HomeFlight(
-                    way.via_enu_m, way.end_enu_m, way.base, way.duration_s, problem.n_base > 0
+                    way.via_enu_m, way.end_enu_m, way.base, way.duration_s, self._lands_by_itself
                 )
             )
         return self._home
+
+    @property
+    def _lands_by_itself(self) -> bool:
+        """Whether the way home ends with a landing right there, and not in the return mode.
+
+        That leads to where it took off last, and up to a height of its own before, past others.
+        """
+        brief, problem = self._replica.brief, self.problem
+        kept_apart = brief is not None and brief.separation_m is not None
+        to_bases = problem is not None and problem.n_base > 0
+        return to_bases or (kept_apart and self._verticals is not None)
 
     def way_out(self) -> Point | None:
         """Where the UAV leaves the zone that it is in, in its layer; None: it is in none."""

@@ -31,6 +31,7 @@ from agent.core.interface import (
     VehicleOrder,
 )
 from agent.core.states import AgentState
+from agent.core.take_off_turn import TakeOffTurn, who_is_in
 from swarm.protocol.board import ranks
 from swarm.protocol.events import Cell, TuneIn
 from swarm.protocol.fields import Point
@@ -81,6 +82,7 @@ class NearTraffic(AgentPart):
     def __init__(self, context: AgentContext, *, is_flown: bool) -> None:
         super().__init__(context)
         self._is_flown = is_flown
+        self._turn = TakeOffTurn(context)
         self.when_disturbed: Callable[[], None] = lambda: None
         """Is told when the vehicle no longer flies as it was ordered."""
         self._brief: MissionConfig | None = None
@@ -91,7 +93,9 @@ class NearTraffic(AgentPart):
         self._telemetry: Telemetry | None = None
         self._way: tuple[Point, ...] = ()
         """Of the last order, from where the vehicle was on."""
-        self._landed = False
+        self._landed = self._leaves_ground = False
+        self._is_let_go = False
+        """It may take off, and is not in the air yet: others keep away as if it were."""
         self._held = False
         """Whether the last order was to stop it, or to bring it home or down at once."""
         self._told = _BY_ITSELF
@@ -161,21 +165,26 @@ class NearTraffic(AgentPart):
 
     def settle(self, now_s: float) -> None:
         """Heed what the vehicle is ordered in this step, decide, and say where it is, if due."""
-        for action in self._actions:
+        keeps_apart = self._heed_brief()
+        for action in tuple(self._actions):
             if isinstance(action, OrderVehicle):
                 self._heed(action.order)
-        if not self._heed_brief() or self._telemetry is None:
+                if keeps_apart:
+                    self._await_turn(action.order)
+        if not keeps_apart or self._telemetry is None:
             return
         if not (self._ordered or now_s >= min(self._decide_at_s, self._say_at_s)):
             return
         own, aloft = self._own(self._telemetry), self._is_aloft(self._telemetry)
+        self._is_let_go &= not aloft
         self._tune_in(own.position_enu_m)
         if self._ordered or now_s >= self._decide_at_s:
             self._decide_at_s = now_s + BEACON_S
+            self._take_turn(own, now_s)
             if aloft:
                 self._decide(own, now_s)
         self._ordered = False
-        self._tell(own, aloft=aloft, now_s=now_s)
+        self._tell(own, aloft=aloft or self._is_let_go, now_s=now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `settle` will next have something to do."""
@@ -187,12 +196,15 @@ class NearTraffic(AgentPart):
         place = () if self._telemetry is None else (self._telemetry.position_enu_m,)
         match order:
             case GoTo(position_enu_m=end, via_enu_m=via):
+                self._leaves_ground = self._landed
                 self._way, self._held, self._landed = (*place, *via, end), False, False
             case Return(via_enu_m=None):
                 home = () if (me := self._mission_view.me) is None else (me.position_enu_m,)
                 self._way, self._held, self._told = (*place, *home), True, _BY_ITSELF
-            case Return(via_enu_m=end, path_enu_m=via) if end is not None:
-                self._way, self._held = (*place, *via, end), False
+            case Return(via_enu_m=end, path_enu_m=via, land=land) if end is not None:
+                me = self._mission_view.me
+                down = () if me is None or not land else ((*end[:2], me.position_enu_m[2]),)
+                self._way, self._held = (*place, *via, end, *down), False
             case Prepare(position_enu_m=end) | Swap(position_enu_m=end):
                 self._way, self._held, self._told = (*place, end), True, _BY_ITSELF
                 self._landed &= isinstance(order, Swap)
@@ -201,6 +213,33 @@ class NearTraffic(AgentPart):
             case Ready() | KeepOut() | GiveWay():
                 return
         self._ordered = True
+
+    def _await_turn(self, order: VehicleOrder) -> None:
+        """Let a vehicle that is about to take off wait until nobody is before or above it."""
+        match order:
+            case Prepare(position_enu_m=top, resume=False):
+                self._turn.begin(top, first=True)
+            case GoTo(position_enu_m=end, via_enu_m=via) if self._leaves_ground:
+                self._turn.begin((*via, end)[0], first=False)
+            case Prepare() | Hold() | Return() | Swap():
+                self._turn.end()
+                self._is_let_go = False
+                return
+            case _:
+                return
+        self._actions.append(OrderVehicle(GiveWay(stands=True)))
+
+    def _take_turn(self, own: OwnFlight, now_s: float) -> None:
+        rules, picture = self._rules, self._picture
+        if not self._turn.is_awaited or rules is None or picture is None:
+            return
+        before = self._turn.goes_before(own.position_enu_m, picture, rules, now_s)
+        if before is not None:
+            self._announcer.explain(f"waits for {before} before it takes off")
+            return
+        self._turn.end()
+        self._is_let_go, self._say_at_s = True, now_s
+        self._actions.append(OrderVehicle(_BY_ITSELF))
 
     def _heed_brief(self) -> bool:
         """Whether there is a distance to keep."""
@@ -228,6 +267,8 @@ class NearTraffic(AgentPart):
         me, state = self._mission_view.me, self._machine.state
         path = self._ahead(telemetry.position_enu_m)
         steered = state in _STEERED and not self._held
+        if state is AgentState.RETURNING_VIA_START and _comes_down(telemetry, path):
+            steered = False
         serves = state is AgentState.SERVING and not path
         if not steered or serves:
             grade = Grade.BOUND
@@ -239,11 +280,14 @@ class NearTraffic(AgentPart):
             telemetry.velocity_enu_m_s,
             path,
             1.0 if me is None else me.speed_m_s,
-            Precedence(grade, self._rank()),
+            Precedence(grade, self._rank(telemetry)),
             steered and not serves,
         )
 
-    def _rank(self) -> int:
+    def _rank(self, telemetry: Telemetry) -> int:
+        """Among those of its grade; of those on their way home the lowest lands first."""
+        if self._machine.state is AgentState.RETURNING_VIA_START:
+            return max(0, round(telemetry.position_enu_m[2]))
         brief, epoch = self._replica.brief, self._replica.epoch
         fleet = [] if brief is None else [uav.id for uav in brief.uavs]
         by_place = fleet.index(self._uav) if self._uav in fleet else len(fleet)
@@ -268,6 +312,8 @@ class NearTraffic(AgentPart):
         if not own.gives_way:
             return
         wanted = _order_of(advice)
+        if wanted == _BY_ITSELF and self._awaits_landing(own, picture, rules, now_s):
+            wanted = GiveWay(stands=True)
         if wanted != self._told:
             if self._told == _BY_ITSELF:
                 self.when_disturbed()
@@ -275,6 +321,17 @@ class NearTraffic(AgentPart):
             self._actions.append(OrderVehicle(wanted))
         if (advice.maneuver, advice.braked) != (before.maneuver, before.braked):
             self._explain(advice)
+
+    def _awaits_landing(
+        self, own: OwnFlight, picture: TrafficPicture, rules: TrafficRules, now_s: float
+    ) -> bool:
+        """Whether it waits, at its start, for those below it to land before."""
+        path, place = own.path_enu_m, own.position_enu_m
+        homebound = self._machine.state is AgentState.RETURNING_VIA_START and len(path) in (1, 2)
+        if not homebound or math.dist(place[:2], path[-1][:2]) > _NEAR_HOME_M:
+            return False
+        above = (*path[-1][:2], max(each[2] for each in (place, *path)))
+        return who_is_in(above, path[-1][2], picture, rules, now_s) is not None
 
     def _explain(self, advice: Advice) -> None:
         if advice.maneuver is Maneuver.KEEP and not advice.braked:
@@ -315,6 +372,19 @@ class NearTraffic(AgentPart):
                 self._mission_view.clock.mission_s(now_s),
             )
         )
+
+
+_NEAR_HOME_M = 25.0
+"""Who is to wait before it lands does so from here on [m]."""
+_DESCENT_M_S = 0.3
+_ABOVE_M = 4.0
+
+
+def _comes_down(telemetry: Telemetry, path: Sequence[Point]) -> bool:
+    """Whether all that is left of its way home is to land, and it has begun."""
+    place = telemetry.position_enu_m
+    is_above = len(path) == 1 and math.dist(place[:2], path[0][:2]) <= _ABOVE_M
+    return is_above and telemetry.velocity_enu_m_s[2] <= -_DESCENT_M_S
 
 
 _STANDS_M = 2.0

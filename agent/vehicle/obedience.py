@@ -122,6 +122,7 @@ def begin_preparing(activity: Activity, order: Prepare, session: VehicleSession)
     session.commands.cancel_all()
     session.forget_mission()
     session.safety.begin()
+    session.awaits_turn = False
     session.cruise_speed_m_s = order.speed_m_s
     session.planned_m_s2 = order.acceleration_m_s2
     session.sent_to_enu_m.append(order.position_enu_m)
@@ -194,6 +195,9 @@ def _go_on_there(activity: Activity, order: GoTo, session: VehicleSession) -> Ac
 def give_way(activity: Activity, order: GiveWay, session: VehicleSession) -> Activity:
     """Make room for another UAV, or go on; whoever can't be interrupted goes on in any case."""
     firmware = session.firmware
+    if isinstance(activity, Preparing):
+        session.awaits_turn = order.stands
+        return activity
     if isinstance(activity, Holding) and activity.yielding is not None:
         activity.yielding.wanted = order  # it is being stopped: what is wanted follows
         return activity
@@ -266,6 +270,7 @@ def _depart(standing: Standing, order: GoTo, session: VehicleSession) -> Activit
     session.commands.cancel_all()
     session.forget_mission()
     session.safety.begin()
+    session.awaits_turn = False
     session.tell_anew()
     return Departing(session, standing, order)
 

@@ -49,6 +49,7 @@ _CAME_DOWN = (
     "and start its agent with --rejoin"
 )
 _NO_PLACE = "waiting for a position"
+_NOT_ITS_TURN = "waiting for its turn to take off"
 _CLIMB_STOPPED = "the vehicle took off and then stopped climbing"
 _ARMED_BY_OTHERS = "somebody else armed it and disarmed it again; prepare it again to take off"
 _FLOWN_BY_PILOT = "its pilot flew and landed it; prepare it again to take off"
@@ -262,6 +263,8 @@ class _Preparation:
             return self._wait(objection)
         if self._mission is not None and not self._mission.is_uploaded:
             return self._upload_way_home(self._mission)
+        if self._session.awaits_turn:
+            return self._wait(_NOT_ITS_TURN)
         self._consent.arm()
         return self._ask(self._arm, self._firmware.arm())
 

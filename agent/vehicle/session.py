@@ -98,6 +98,8 @@ class VehicleSession(Conversation):
         """Of the last preparation; 0 before the first."""
         self.pace_m_s: float | None = None
         """Slower than that, as it gives way to another UAV; None: it does not."""
+        self.awaits_turn = False
+        """Whether it must not take off yet, as another UAV goes before."""
         self.planned_m_s2: float | None = None
         """Acceleration that the mission counts on; None: it says none."""
         self.set_m_s2: float | None = None

@@ -96,6 +96,8 @@ class _Other:
     uav: str
     track: Track
     expected_m: FloatArray
+    column_m: FloatArray | None
+    """What it passes straight up or down, whenever."""
     stops_m: FloatArray
     stray_m: tuple[float, float]
     goes_first: bool
@@ -207,7 +209,7 @@ class TacticalResolver:
             silent or (theirs, uav) < (mine, self._uav) or theirs.grade is Grade.BOUND
         )
         expected_m = track.expected_m(now_s, self._rules)
-        return _Other(uav, track, expected_m, stops_m, stray_m, first)
+        return _Other(uav, track, expected_m, track.column_m(), stops_m, stray_m, first)
 
     def _blame(self, others: Sequence[_Other], passed_s: float, now_s: float) -> None:
         """Count who has kept this UAV from flying since the last decision."""
@@ -357,6 +359,10 @@ class TacticalResolver:
             here_m = math.dist(way_m[0], other.expected_m[0]) - _GRID_M
             if least_meeting_m(way_m, other.expected_m) < min(asked_m, here_m):
                 return other.uav
+            if other.column_m is not None:
+                here_m = least_distance_m(way_m[:1], other.column_m) - _GRID_M
+                if least_distance_m(way_m, other.column_m) < min(asked_m, here_m):
+                    return other.uav
         return None
 
     # -- braking ------------------------------------------------------------------------

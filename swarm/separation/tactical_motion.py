@@ -20,6 +20,7 @@ Place = tuple[float, float, float]
 STEP_S = 0.25
 """Between two samples of a motion [s]."""
 _REACHED_M = 0.5
+_COLUMN_STEP_M = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,6 +104,12 @@ def motion_m(
         vx, vy, vz = vx + ax, vy + ay, vz + az
         places.append((px, py, pz))
     return np.array(places)
+
+
+def column_m(place_m: Place, end_up_m: float) -> FloatArray:
+    """Places straight above or below one, as far as that height; shape (samples, 3)."""
+    samples = 2 + math.ceil(abs(end_up_m - place_m[2]) / _COLUMN_STEP_M)
+    return np.linspace(place_m, (place_m[0], place_m[1], end_up_m), samples)
 
 
 def stray_m(age_s: float, speed_m_s: float, agility: Agility) -> tuple[float, float]:

@@ -18,6 +18,7 @@ from swarm.separation.tactical_motion import (
     Agility,
     FloatArray,
     Place,
+    column_m,
     motion_m,
     stray_m,
 )
@@ -127,8 +128,8 @@ SILENT_S = 3.0
 next words of a turn get lost together less than once in 10^8 turns at 20 % loss."""
 FORGET_S = 60.0
 """From then on only what it has claimed keeps others off its way."""
-_STANDS_M = 5.0
-"""Who moves about less stands."""
+_STANDS_M, _STANDS_S = 5.0, 30.0
+"""Who has moved about less for so long stands."""
 _IMPLAUSIBLE_S = 10.0
 _JUMP_ROOM_M = 5.0
 _LATE_S = 1.0
@@ -159,8 +160,8 @@ class Track:
         """For how long it has kept this UAV from flying, less what is forgiven."""
         self._counted_s = now_s
         self._stood_at_m = word.position_enu_m
-        self._moved = False
-        """Whether it has been seen to move since it last cost nothing."""
+        self._moved_s = -math.inf
+        """When it was last seen to have moved."""
         self._implausible_until_s = -math.inf
         self._disbelieved_until_s = -math.inf
 
@@ -172,12 +173,12 @@ class Track:
             self._implausible_until_s = now_s + _IMPLAUSIBLE_S
         if math.dist(word.position_enu_m, self._stood_at_m) > _STANDS_M:
             self._stood_at_m = word.position_enu_m
-            self._moved = True
+            self._moved_s = now_s
         self.word, self.said_s = word, now_s - age_s
 
     def blame(self, now_s: float, seconds: float) -> None:
         """It has kept this UAV from flying for so long; who only stands is not blamed."""
-        if not self._moved:
+        if now_s - self._moved_s > _STANDS_S:
             return
         self.cost_s += seconds
         if self.cost_s >= PATIENCE_S:
@@ -188,8 +189,6 @@ class Track:
         """Time passes."""
         self.cost_s = max(0.0, self.cost_s - _FORGIVEN * (now_s - self._counted_s))
         self._counted_s = now_s
-        if self.cost_s == 0.0 and math.hypot(*self.word.velocity_enu_m_s) < 0.5:
-            self._moved = False
 
     def is_plausible(self, now_s: float) -> bool:
         """Whether what it has said of late fits together."""
@@ -216,6 +215,14 @@ class Track:
         )
         samples = 1 + math.ceil(rules.horizon_s / STEP_S)
         return way_m[-samples:]
+
+    def column_m(self) -> FloatArray | None:
+        """All that it is going to pass straight up or down, as it can't do otherwise; else None."""
+        word = self.word
+        if word.precedence.grade is not Grade.BOUND or not word.path_enu_m:
+            return None
+        here, end = word.position_enu_m, word.path_enu_m[-1]
+        return None if math.dist(here[:2], end[:2]) > _STANDS_M else column_m(here, end[2])
 
     def stops_m(self, now_s: float, rules: TrafficRules) -> tuple[FloatArray, tuple[float, float]]:
         """Where it may be before it has stopped, however it decides until it hears more.
@@ -269,6 +276,11 @@ class TrafficPicture:
     def is_busy(self) -> bool:
         """Whether anybody may be near."""
         return bool(self._tracks)
+
+    def place_of(self, uav: str) -> Place | None:
+        """Where a UAV said last that it is; None: it is not heard."""
+        track = self._tracks.get(uav)
+        return None if track is None else track.word.position_enu_m
 
     def forget(self, uav: str) -> None:
         """It has landed."""

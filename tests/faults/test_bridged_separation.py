@@ -94,3 +94,17 @@ def test_random_ways_with_lost_words(seed: int, monkeypatch: pytest.MonkeyPatch)
     told = "\n".join(fleet.told())
     assert sorted(result.done) == sorted(task.id for task in mission.tasks), told
     assert fleet.nearest_m >= SEPARATION_M - 1.0, fleet.nearest
+
+
+@ONE_DIAGONAL
+def test_who_starts_side_by_side_takes_off_and_lands_one_after_the_other(
+    flavour: FirmwareModelName, style: CommandStyle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Three starts 3 m apart, in layers of their own; all come home at once."""
+    ways = [((3.0 * n, 0.0), (-30.0 + 30.0 * n, 60.0)) for n in range(3)]
+    fleet = CrossingFleet(monkeypatch, flavour, style, mission_of(*ways, band_m=(15.0, 60.0)))
+
+    fleet.fly(900.0)
+
+    fleet.assert_all_done()
+    assert fleet.nearest_m >= SEPARATION_M - 1.0, fleet.nearest
