@@ -25,7 +25,7 @@ from swarm.separation.tactical_motion import (
 from swarm.separation.tactical_traffic import (
     Grade,
     Precedence,
-    Track,
+    NearbyTrack,
     TrafficPicture,
     TrafficRules,
     TrafficWord,
@@ -94,7 +94,7 @@ class _Other:
     """Another UAV, as it counts in one decision."""
 
     uav: str
-    track: Track
+    track: NearbyTrack
     expected_m: FloatArray
     column_m: FloatArray | None
     """What it passes straight up or down, whenever."""
@@ -200,7 +200,7 @@ class TacticalResolver:
 
     # -- those near it ------------------------------------------------------------------
 
-    def _look(self, own: OwnFlight, uav: str, track: Track, now_s: float) -> _Other:
+    def _look(self, own: OwnFlight, uav: str, track: NearbyTrack, now_s: float) -> _Other:
         stops_m, stray_m = track.stops_m(now_s, self._rules)
         mine = self._borrowed or own.precedence
         theirs = track.word.precedence

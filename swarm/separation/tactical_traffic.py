@@ -143,7 +143,7 @@ _FORGIVEN = 0.2
 """Share of the time that is taken off what it has cost."""
 
 
-class Track:
+class NearbyTrack:
     """One UAV near this one.
 
     Args:
@@ -255,7 +255,7 @@ class TrafficPicture:
     def __init__(self, rules: TrafficRules, heard_m: float) -> None:
         self._rules = rules
         self._heard_m = heard_m
-        self._tracks: dict[str, Track] = {}
+        self._tracks: dict[str, NearbyTrack] = {}
 
     def hear(self, uav: str, word: TrafficWord, now_s: float, age_s: float) -> None:
         """Another UAV says so of itself.
@@ -268,7 +268,7 @@ class TrafficPicture:
         """
         track = self._tracks.get(uav)
         if track is None:
-            self._tracks[uav] = Track(word, now_s, age_s)
+            self._tracks[uav] = NearbyTrack(word, now_s, age_s)
         elif now_s - age_s >= track.said_s:
             track.hear(word, now_s, age_s, self._rules)
 
@@ -286,7 +286,7 @@ class TrafficPicture:
         """It has landed."""
         self._tracks.pop(uav, None)
 
-    def near(self, place_m: Place, now_s: float) -> Iterator[tuple[str, Track]]:
+    def near(self, place_m: Place, now_s: float) -> Iterator[tuple[str, NearbyTrack]]:
         """Those who matter to a UAV at that place, in the order of their ids."""
         for uav, track in sorted(self._tracks.items()):
             track.forgive(now_s)
@@ -303,7 +303,7 @@ class TrafficPicture:
                     continue
                 yield uav, track
 
-    def _has_left(self, track: Track, place_m: Place, now_s: float) -> bool:
+    def _has_left(self, track: NearbyTrack, place_m: Place, now_s: float) -> bool:
         """Whether it is no wonder that it is not heard: it has flown on, as it said."""
         expected_m = track.expected_m(now_s, self._rules)[0]
         return math.dist(place_m, expected_m.tolist()) > self._heard_m

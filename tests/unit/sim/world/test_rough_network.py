@@ -38,6 +38,7 @@ class Listener:
     name: str
     writer: str | None
     answers: bool = True
+    cells: frozenset[tuple[int, int]] = frozenset()
     told: list[tuple[float, CommonEvent]] = field(default_factory=list)
 
     def receive(self, fact: CommonEvent) -> None:
