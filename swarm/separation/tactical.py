@@ -24,8 +24,8 @@ from swarm.separation.tactical_motion import (
 )
 from swarm.separation.tactical_traffic import (
     Grade,
-    Precedence,
     NearbyTrack,
+    Precedence,
     TrafficPicture,
     TrafficRules,
     TrafficWord,
