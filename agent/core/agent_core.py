@@ -20,11 +20,8 @@ from agent.core.field_tasking import FieldTasking
 from agent.core.interface import (
     Action,
     Event,
-    KeepOut,
     OrderVehicle,
-    Return,
     Telemetry,
-    VehicleOrder,
 )
 from agent.core.memory import RecoveredState, SaveCondition
 from agent.core.mission_view import MissionView, Peers
@@ -39,6 +36,7 @@ from agent.core.states import (
     Trigger,
 )
 from agent.core.stop_conditions import BusLossTimer, EndCondition, OperatorCommands
+from agent.core.told_zones import ToldZones
 from agent.core.vehicle_commander import VehicleCommander
 from agent.core.verticals import Verticals
 from swarm.model.ids import COORDINATOR
@@ -56,9 +54,8 @@ from swarm.protocol.events import (
     Stop,
     Tick,
 )
-from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import CommandKind, Message, Snapshot
-from swarm.protocol.operator_commands import describe_command, zones_in_force
+from swarm.protocol.operator_commands import describe_command
 from swarm.protocol.register_writer import RegisterWriter
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import StallDetector, Timing, earliest
@@ -153,9 +150,7 @@ class AgentCore(AgentPart):
         self._bus_loss = BusLossTimer(without_bus_s)
         self._stall_detector = StallDetector(timing.pause_s)
         self._deadline_s: float | None = None
-        self._has_vehicle = False
-        """Whether a vehicle was ordered to fly, which there is from then on."""
-        self._told_zones: tuple[ZoneSpec, ...] = ()
+        self._told_zones = ToldZones(self.replica)
 
     # -- the one entry point ------------------------------------------------------
 
@@ -467,17 +462,6 @@ class AgentCore(AgentPart):
     def _note_impossible(self, state: AgentState, trigger: Trigger) -> None:
         self._log(IMPOSSIBLE, state=state.name, trigger=trigger.name)
 
-    def _tell_zones(self, actions: list[Action]) -> None:
-        """Before it is ordered anything else, the vehicle learns where not to fly."""
-        orders = [action.order for action in actions if isinstance(action, OrderVehicle)]
-        self._has_vehicle |= any(map(_begins_flight, orders))
-        zones = zones_in_force(self.replica) if orders and self._has_vehicle else self._told_zones
-        brief = self.replica.brief
-        if zones != self._told_zones and brief is not None:
-            self._told_zones = zones
-            known = tuple(zone.zone() for zone in zones)
-            actions.insert(0, OrderVehicle(KeepOut(known, brief.zone_margin_m)))
-
     def _settle(self, now_s: float) -> None:
         """Ask for ways, grant those of others, and set off on what is granted."""
         for refused in self._airway.settle(now_s):
@@ -491,7 +475,7 @@ class AgentCore(AgentPart):
         """What came of the step; a change worth it is kept for a later life."""
         actions = self._actions.copy()
         self._actions.clear()
-        self._tell_zones(actions)
+        self._told_zones.tell(actions)
         remembers = self.state not in (AgentState.SYNCING, AgentState.YIELDED)
         if remembers and self._saving.worth_keeping(actions, now_s):
             actions.insert(0, Save())
@@ -501,11 +485,6 @@ class AgentCore(AgentPart):
         self._deadline_s = self._earliest_deadline_s()
         self._stall_detector.expect_by(self._deadline_s)
         return actions
-
-
-def _begins_flight(order: VehicleOrder) -> bool:
-    """Whether there is a vehicle from then on: a return alone asks for none."""
-    return not isinstance(order, Return) or order.resume
 
 
 def _place(action: Action) -> int:
