@@ -91,8 +91,6 @@ class Scene:
     """The two UAVs in flight that are nearest to each other."""
     nearest: Approach | None = None
     """The nearest that two have come to each other so far."""
-    separation_m: float | None = None
-    """How far they are to keep from each other [m]; None: nobody asks for that."""
 
     @property
     def aborted(self) -> bool:

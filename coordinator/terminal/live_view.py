@@ -303,7 +303,7 @@ def _nearest(scene: Scene, width: int, signs: Signs) -> list[Text]:
             continue
         at = "" if when == "now" or near.at_s is None else f" at {near.at_s:.1f} s"
         apart = f"{' '.join(near.uavs)} {shown_m(near.distance_m)} m {when}{at}"
-        style = BAD if near.is_within(scene.separation_m) else ""
+        style = BAD if near.is_within(scene.mission.separation_m) else ""
         told.append(Text(clean(apart, ascii_only=not signs.braille), style))
     heading = Text("near   ", "bold")
     if heading.cell_len + sum(each.cell_len for each in told) + 3 <= width:

@@ -78,8 +78,6 @@ class MissionReport:
     closest_approach: Approach | None = None
     """The nearest that two UAVs in the air came to each other; None of a single one, or if it is
     not known."""
-    separation_m: float | None = None
-    """How far they were to keep from each other [m]; None: nobody asked for that."""
     nearest_zone_m: float | None = None
     """Least distance of a UAV in flight from a zone [m]; None without zones, or if not known."""
     lowest_clearance_m: float | None = None
@@ -114,7 +112,7 @@ class MissionReport:
             "executed_completion_s": dict(result.executed_completion_s),
             "executed_objective": result.executed_objective,
             "executed_schedule": schedule_as_json(self.executed_schedule),
-            **approach_as_json(self.closest_approach, self.separation_m),
+            **approach_as_json(self.closest_approach, self.mission.separation_m),
             "nearest_zone_m": self.nearest_zone_m,
             "lowest_clearance_m": self.lowest_clearance_m,
             "lowest_charge_frac": dict(self.lowest_charge_frac),
@@ -194,7 +192,7 @@ class MissionReport:
             text = f"{shown_value(self.value)} value·s: m·(D − t) of each success, failures nothing"
             found.append(ReportFact("by outcomes", text))
         if (near := self.closest_approach) is not None:
-            found.append(nearest_fact(near, self.separation_m))
+            found.append(nearest_fact(near, self.mission.separation_m))
         found += self._of_field()
         found += areas_in_words(self.mission, _planned_tasks(self.plan), self.result.done)
         spent = []

@@ -63,7 +63,7 @@ def status_as_json(scene: Scene) -> dict[str, Any]:
             command.target: {"command": command.kind.value, "reason": command.reason}
             for command in scene.commands
         },
-        **approach_as_json(scene.nearest, scene.separation_m),
+        **approach_as_json(scene.nearest, scene.mission.separation_m),
         "nearest_now": None if scene.nearest_now is None else scene.nearest_now.as_json(),
         "uavs": [_uav_as_json(uav) for uav in scene.uavs],
         "dropped": scene.dropped_by_reason,
@@ -104,7 +104,7 @@ def status_table(scene: Scene, width: int, signs: Signs) -> RenderableType:
     facts.add_row("J so far", f"{shown_value(scene.objective)} value{signs.product}s")
     for name, near in (("nearest now", scene.nearest_now), ("nearest so far", scene.nearest)):
         if near is not None:
-            style = BAD if near.is_within(scene.separation_m) else ""
+            style = BAD if near.is_within(scene.mission.separation_m) else ""
             facts.add_row(name, Text(approach_in_words(near), style))
     there = Text("there") if scene.coordinator else Text("not there", BAD)
     facts.add_row("coordinator", there)

@@ -78,7 +78,8 @@ class FieldNetwork:
             _layers_m(mission, uavs) if layers_m is None else list(map(float, layers_m))
         )
         self._band_m = mission.band_m
-        if self._band_m is None and (slabs := slabs_of(mission, min(self._layers_m))) is not None:
+        lowest_m = min(self._layers_m, default=0.0)  # of no UAVs whatever
+        if self._band_m is None and (slabs := slabs_of(mission, lowest_m)) is not None:
             self._band_m = slabs.layers_m[0], slabs.layers_m[-1]
         zones = mission.zones
         self._ground: Ground | None = None
@@ -86,7 +87,7 @@ class FieldNetwork:
             self._ground = ground_of(mission.terrain)
             # Heights over the ground follow from the paths: zones that could matter, matter.
             self._band_m = -np.inf, np.inf
-            zones = tuple(_zones_over(self._ground, mission, max(self._layers_m)))
+            zones = tuple(_zones_over(self._ground, mission, max(self._layers_m, default=0.0)))
         self._airspace = Airspace(zones, mission.zone_margin_m)
         flown = [_points(task, self._ground) for task in tasks]
         self.node_enu_m, self.enter, self._in_layer = _nodes(uavs, mission.bases, tasks, flown)
