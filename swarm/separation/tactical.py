@@ -14,6 +14,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from swarm.separation.tactical_motion import (
     STEP_S,
     FloatArray,
@@ -235,17 +237,40 @@ class TacticalResolver:
         elif now is None or now_s - self._in_way_s >= _CLEAR_S:
             return keep, None
         if now is not None and self._left.get(now.label, -math.inf) <= now_s:
-            still_in_way = self._in_way(own, now, others)
             waits = now.maneuver is Maneuver.HOLD and self._has_stood(now_s) and own.path_enu_m
-            if still_in_way is None and not waits:
+            if not waits and (
+                self._in_way(own, now, others) is None or self._gets_out(now, others)
+            ):
                 return now, self._advice.because_of or in_way
-        for option in self._options(own, others, in_way, now_s):
-            if self._left.get(option.label, -math.inf) > now_s:
-                continue
-            if self._in_way(own, option, others) is None and self._is_clear(own, option):
+        options = [
+            option
+            for option in self._options(own, others, in_way, now_s)
+            if self._left.get(option.label, -math.inf) <= now_s and self._is_clear(own, option)
+        ]
+        for option in options:
+            if self._in_way(own, option, others) is None:
+                return option, in_way or self._advice.because_of
+        for option in options:
+            if self._gets_out(option, others):
                 return option, in_way or self._advice.because_of
         hold = _Option(Maneuver.HOLD, (), own.speed_m_s, "hold")
         return hold, in_way or self._advice.because_of
+
+    def _gets_out(self, option: _Option, others: Sequence[_Other]) -> bool:
+        """Whether it waits off the ways of all who go first, though they come before it is there.
+
+        They brake for it; that they would fly on at once is no reason to stay in their way.
+        """
+        if option.maneuver is not Maneuver.ASIDE:
+            return False
+        end_m = np.array(option.path_enu_m[-1:])
+        return all(
+            least_distance_m(end_m, way_m) >= self._rules.apart_m
+            for other in others
+            if other.goes_first
+            for way_m in (other.expected_m, other.column_m)
+            if way_m is not None
+        )
 
     def _has_stood(self, now_s: float) -> bool:
         return self._stood_since_s is not None and now_s - self._stood_since_s >= _HELD_S

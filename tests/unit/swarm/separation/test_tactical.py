@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -93,6 +94,18 @@ def test_all_arrive_and_nobody_comes_too_near(name: str, loss_frac: float, delay
     assert arrived, crowd.told()
     least_m = RULES.separation_m - 2.0 * RULES.position_error_m
     assert crowd.nearest_m >= least_m, crowd.told()
+
+
+def test_one_that_stands_right_before_another_makes_room_beside_where_there_is_one_layer() -> None:
+    """It can't be off the way before the other one would be there, if that did not brake."""
+    flyers = [
+        flyer("a", 0, at(0, 0), at(60, 0)),
+        standing("b", 1, at(11.05, 0.5), Grade.FREE),
+    ]
+    crowd = Crowd(replace(RULES, low_m=UP_M - 1.0, high_m=UP_M + 6.0), flyers)
+
+    assert crowd.fly(120.0), crowd.told()
+    assert crowd.nearest_m >= RULES.separation_m - 2.0, crowd.told()
 
 
 def test_without_giving_way_they_would_collide() -> None:
