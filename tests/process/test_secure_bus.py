@@ -255,8 +255,11 @@ async def answering(reader: Reader, name: str) -> AsyncIterator[None]:
 def said_by(reader: Reader) -> dict[str, set[str]]:
     """Keys on which somebody was heard, by name."""
     heard: dict[str, set[str]] = {name: set() for name in OWN}
+    names = {name.encode(): name for name in OWN}
     for sample in reader.of(Sample):
-        heard[sample.payload.decode()].add(sample.key)
+        if sample.key == KEYS.roster and sample.payload not in names:
+            continue  # the router repeats the true one now and then
+        heard[names[sample.payload]].add(sample.key)
     return heard
 
 
