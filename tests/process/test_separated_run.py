@@ -56,7 +56,7 @@ def test_who_crosses_keeps_the_separation(tmp_path: Path) -> None:
             )
         )
     scenario.write_text("".join(told), encoding="utf-8")
-    words = [str(scenario), "--method", "greedy", "--speedup", f"{pace(4.0):g}"]
+    words = [str(scenario), "--method", "greedy", "--speedup", f"{pace(8.0):g}"]
     with SwarmRun(words, folder) as run:
         status, report = run.result()
 
