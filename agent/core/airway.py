@@ -118,8 +118,9 @@ class Airway:
             return event
         match event:
             case Telemetry(position_enu_m=place):
-                self._place = place
-                return replace(event, position_enu_m=self._nominal(place))
+                self._place, nominal_enu_m = place, self._nominal(place)
+                self._mission_view.raised_m = place[2] - nominal_enu_m[2]
+                return replace(event, position_enu_m=nominal_enu_m)
             case VehicleReady():
                 self._aloft = True
             case Arrived(leg=leg) if leg == self._flown_leg:

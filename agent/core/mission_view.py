@@ -53,6 +53,8 @@ class MissionView:
         """Of the step that is under way, on the own clock."""
         self._moved_s = 0.0
         """When the vehicle last told where it is, by the same clock."""
+        self.raised_m = 0.0
+        """How much higher it flies than in its layer in the brief, where layers are shared [m]."""
         self._below_m: float | None = None
         """How much lower than the vehicle that place is [m]; None: its layer was not known."""
         self._place_enu_m: Point | None = None
@@ -166,7 +168,10 @@ class MissionView:
     @property
     def told_layer_m(self) -> float | None:
         """How much higher than that place it is [m]; None: by its layer in the brief."""
-        below_m = 0.0 if self.stands else self._below_m
+        if self.stands:
+            below_m: float | None = 0.0
+        else:
+            below_m = None if self._below_m is None else self._below_m + self.raised_m
         return None if below_m == self._layer_m else below_m
 
     def move(self, telemetry: Telemetry) -> None:
