@@ -92,6 +92,15 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     _draw_tasks(axes, mission, plan, looks, diameters)
     draw_bases(axes, mission)
     draw_starts(axes, mission, looks)
+    finish_map(axes, mission, f"{plan.scenario}: lists by {plan.method}")
+    _draw_legend(figure, mission, plan, looks)
+    figure.draw_without_rendering()  # settles the scale in which labels must not overlap
+    _draw_labels(axes, mission, diameters)
+    return figure
+
+
+def finish_map(axes: Axes, mission: Mission, title: str) -> None:
+    """Add zones, wind, scale [m] and title to a map on which all else is drawn."""
     axes.set_aspect("equal", adjustable="box")
     axes.margins(0.09)
     draw_zones(axes, mission)
@@ -100,11 +109,7 @@ def plan_figure(mission: Mission, plan: Plan) -> Figure:
     axes.set_ylabel("north [m]")
     axes.grid(visible=True, color="#e4e4e4", linewidth=0.6)
     axes.set_axisbelow(True)
-    axes.set_title(f"{plan.scenario}: lists by {plan.method}", loc="left", fontweight="bold")
-    _draw_legend(figure, mission, plan, looks)
-    figure.draw_without_rendering()  # settles the scale in which labels must not overlap
-    _draw_labels(axes, mission, diameters)
-    return figure
+    axes.set_title(title, loc="left", fontweight="bold")
 
 
 def size_inches(mission: Mission) -> tuple[float, float]:

@@ -19,12 +19,10 @@ from coordinator.plot.field import (
     draw_bases,
     draw_lines,
     draw_schedule,
-    draw_wind,
-    draw_zones,
     field_labels,
     place_legend,
 )
-from coordinator.plot.figure import draw_starts, save_figure, size_inches
+from coordinator.plot.figure import draw_starts, finish_map, save_figure, size_inches
 from coordinator.plot.labels import place_labels
 from coordinator.plot.looks import LATE, SHARED, UNPLANNED, PathStyle, marker, path_styles
 from swarm.model import Mission, Plan, TaskId, UavId
@@ -86,15 +84,7 @@ def flight_figure(flight: DrawnFlight) -> Figure:
     draw_bases(axes, mission)
     draw_starts(axes, mission, looks)
     _draw_nearest(axes, flight)
-    axes.set_aspect("equal", adjustable="box")
-    axes.margins(0.09)
-    draw_zones(axes, mission)
-    draw_wind(axes, mission)
-    axes.set_xlabel("east [m]")
-    axes.set_ylabel("north [m]")
-    axes.grid(visible=True, color="#e4e4e4", linewidth=0.6)
-    axes.set_axisbelow(True)
-    axes.set_title(f"{mission.name}: as flown", loc="left", fontweight="bold")
+    finish_map(axes, mission, f"{mission.name}: as flown")
     _draw_legend(figure, flight, looks)
     figure.draw_without_rendering()  # settles the scale in which labels must not overlap
     place_labels(axes, [*area_labels(mission), *field_labels(mission)], _LABEL_POINTS)
