@@ -252,12 +252,12 @@ async def answering(reader: Reader, name: str) -> AsyncIterator[None]:
         task.cancel()
 
 
-def said_by(reader: Reader, roster: bytes) -> dict[str, set[str]]:
-    """Keys on which somebody was heard, by name; the router repeats the true roster besides."""
+def said_by(reader: Reader, roster: bytes | None = None) -> dict[str, set[str]]:
+    """Keys on which somebody was heard, by name; a router repeats the true ``roster`` besides."""
     heard: dict[str, set[str]] = {name: set() for name in OWN}
     names = {name.encode(): name for name in OWN}
     for sample in reader.of(Sample):
-        if sample.key == KEYS.roster and roster in sample.payload:
+        if roster is not None and sample.key == KEYS.roster and roster in sample.payload:
             continue
         heard[names[sample.payload]].add(sample.key)
     return heard
@@ -338,11 +338,7 @@ def test_in_a_mesh_each_peer_hears_of_others_what_is_theirs_and_nothing_else(
                 await say_all(reader, name)
             for name, reader in readers.items():
                 reader.events += reader.bus.inbox.take()
-                heard = {
-                    other: keys
-                    for other, keys in said_by(reader, fleet.authority.roster_bytes()).items()
-                    if keys
-                }
+                heard = {other: keys for other, keys in said_by(reader).items() if keys}
                 assert heard == {other: OWN[other] for other in names if other != name}
 
     asyncio.run(scenario())
