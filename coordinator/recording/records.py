@@ -42,7 +42,7 @@ from swarm.protocol.messages import (
     TaskEdit,
     TaskEntry,
 )
-from swarm.protocol.uav_messages import Calibration, Choice, Claim, Outcome, Status
+from swarm.protocol.uav_messages import Calibration, Choice, Claim, Nearby, Outcome, Status
 
 FORMAT: Final = "1"
 """Version of all schemas here; grows when what was written before cannot be read any more."""
@@ -56,6 +56,7 @@ _BODIES: Final[dict[str, type[Body]]] = {
     "Calibration": Calibration,
     "Status": Status,
     "Choice": Choice,
+    "Nearby": Nearby,
     "Command": OperatorCommand,
     "TaskOrder": TaskEdit,
     "StartWithout": StartWithout,

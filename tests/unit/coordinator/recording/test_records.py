@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from functools import cache
-from typing import Any
+from typing import Any, get_args
 
 import jsonschema
 import pytest
@@ -17,6 +17,7 @@ from coordinator.recording.records import (
     SCHEMAS,
     RecordingStarted,
     UnreadableError,
+    body_name,
     decode,
     encode,
     schema_of,
@@ -34,7 +35,7 @@ from swarm.protocol.events import (
     Stop,
     Tick,
 )
-from swarm.protocol.messages import Message, Snapshot, TaskEdit
+from swarm.protocol.messages import Body, Message, Snapshot, TaskEdit
 from swarm.runtime.clock import SystemClock
 from swarm.scenario import load_scenario, shipped_scenarios
 from tests.support.builders import MISSION, done, held, message
@@ -92,6 +93,11 @@ def validator(schema: str) -> Any:
     shape = json.loads(schema_of(schema))
     jsonschema.Draft202012Validator.check_schema(shape)
     return jsonschema.Draft202012Validator(shape)
+
+
+@pytest.mark.parametrize("kind", get_args(Body))
+def test_every_kind_of_message_has_a_schema(kind: type[Body]) -> None:
+    assert f"peckorder.{body_name(object.__new__(kind))}" in SCHEMAS
 
 
 @given(facts, st.floats(0.0, 1e9), st.none() | numbers)
