@@ -22,16 +22,13 @@ from swarm.model.frames import wgs84_from_enu
 from swarm.model.terrain import Terrain
 from swarm.scenario.task_files.exported_tasks import ExportedTask
 from swarm.scenario.task_files.mission_items import MavCommand, MavFrame
-from swarm.scenario.task_files.survey_patterns import STRUCTURE_KIND
+from swarm.survey.structures import structure_middle_m
 
 _RELATIVE = 1
 _GROUND_SPEED = 1
 _THROTTLE_AS_IT_IS = -1
 _PICTURE_AT_ONCE = 1
 _LEAST_WAIT_S = 1e-6
-_LEAST_RING = 4
-"""Points of a closed line round anything, its beginning told twice."""
-_CLOSED_M = 0.1
 _Point = tuple[float, float, float]
 
 
@@ -179,9 +176,10 @@ class SortieItems:
             self._remember(leg, first, first)
             return
         self._at(MavCommand.WAYPOINT, leg.wait_s, points[0])
-        if (structure_enu_m := _structure_enu_m(task, points)) is not None:
+        if (middle_m := structure_middle_m(task.kind, points)) is not None:
             # Who has no gimbal that turns points its nose there, with either firmware.
-            self._at(MavCommand.SET_ROI_LOCATION, 0.0, structure_enu_m, heading=0.0)
+            level_with_it = (*middle_m, points[0][2])
+            self._at(MavCommand.SET_ROI_LOCATION, 0.0, level_with_it, heading=0.0)
         if task.trigger_m is not None:
             self._do(MavCommand.SET_CAM_TRIGG_DIST, task.trigger_m, 0, _PICTURE_AT_ONCE)
         for point in points[1:-1]:
@@ -190,7 +188,7 @@ class SortieItems:
         self._remember(leg, first, len(self._items))
         if task.trigger_m is not None:
             self._do(MavCommand.SET_CAM_TRIGG_DIST, 0, 0, _PICTURE_AT_ONCE)
-        if structure_enu_m is not None:
+        if middle_m is not None:
             self._do(MavCommand.SET_ROI_NONE)
 
     def _remember(self, leg: Leg, first: int, last: int) -> None:
@@ -232,17 +230,6 @@ class SortieItems:
 def _raised(point_enu_m: _Point, layer_m: float) -> _Point:
     east_m, north_m, up_m = point_enu_m
     return east_m, north_m, up_m + layer_m
-
-
-def _structure_enu_m(task: Task, points: Sequence[_Point]) -> _Point | None:
-    """The middle of what a closed line leads round, as high as it is flown [m]; None: nothing."""
-    closed = len(points) >= _LEAST_RING and math.dist(points[0], points[-1]) <= _CLOSED_M
-    if task.kind != STRUCTURE_KIND or not closed:
-        return None
-    import shapely
-
-    middle = shapely.Polygon([point[:2] for point in points]).centroid
-    return middle.x, middle.y, points[0][2]
 
 
 def _said_of(task: Task) -> Iterator[tuple[str, object]]:

@@ -24,6 +24,7 @@ from swarm.protocol.field_messages import BaseSpec, ZoneSpec
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import TaskEntry
 from swarm.protocol.operator_commands import zones_in_force
+from swarm.survey.structures import structure_middle_m
 
 if TYPE_CHECKING:
     from swarm.allocation.legs.ground import Ground
@@ -342,6 +343,7 @@ class Flights(AgentPart):
         name, trigger_m = task.task, task.trigger_m
         own_height = task.height_m is not None
         goes = GoTo(self.leg, flown[-1], stay_s, False, name, attempt, via_enu_m, trigger_m)
+        goes = replace(goes, look_at_m=structure_middle_m(task.kind, flown))
         self._order(goes, own_height=own_height, fixed=own_height)
         return points[-1]
 

@@ -56,6 +56,9 @@ class GoTo:
     trigger_m: float | None = field(default=None, repr=False)
     """How far apart the camera takes pictures on the way [m], 0: it takes none; None: it is no
     concern, and is left alone."""
+    look_at_m: tuple[float, float] | None = field(default=None, repr=False)
+    """Where the camera looks along the way [m; east, north; mission origin], level with the target;
+    None: nowhere in particular."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import math
 from enum import Enum
 from typing import ClassVar
 
+from agent.vehicle.camera_control import Look
 from agent.vehicle.commands import CommandEnded
 from agent.vehicle.messages import Heartbeat, Inbound, Position
 from agent.vehicle.session import POLL_S, VehicleSession
@@ -63,6 +64,11 @@ class Activity:
     @property
     def trigger_m(self) -> float | None:
         """How far apart its camera takes pictures [m]; None: it takes none, if it has any."""
+        return None
+
+    @property
+    def look(self) -> Look | None:
+        """What its camera looks at; None: nothing in particular."""
         return None
 
     def expects(self, heartbeat: Heartbeat) -> bool:

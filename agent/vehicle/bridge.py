@@ -382,6 +382,7 @@ class Bridge:
         session, activity = self._session, self._activity
         if session.firmware is not None and activity.in_our_hands:
             session.camera.want(activity.trigger_m)
+            session.camera.look(activity.look)
             session.camera.advance(session.firmware)
 
     def _advance_override(self) -> None:

@@ -15,6 +15,7 @@ from enum import Enum, auto
 
 from agent.core.interface import Arrived, GoTo, HandedOver, Refused
 from agent.vehicle.activity import Activity, FlightPhase
+from agent.vehicle.camera_control import Look
 from agent.vehicle.commands import CommandEnded, CommandOutcome
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
@@ -27,6 +28,10 @@ from swarm.protocol.fields import Point
 
 TARGET_TAG = "target"
 """Tag of the command that carries a target: a new one supersedes the last."""
+
+
+_TURN_RAD = math.radians(15.0)
+"""So far the nose may be beside what it is to point at, where targets turn it."""
 
 
 class ArrivalState(Enum):
@@ -109,6 +114,11 @@ class _Leg(ABC):
 
     @property
     @abstractmethod
+    def takings(self) -> int:
+        """How often the vehicle has taken what it was told; 0: it does not fly there yet."""
+
+    @property
+    @abstractmethod
     def accepted(self) -> bool:
         """Whether the target is in force."""
 
@@ -144,6 +154,8 @@ class RepositionLeg(_Leg):
         speed_m_s: cruise ground speed.
         insists: the target is told again if the vehicle stands still elsewhere. If not, one
             that stopped on its way is taken to be somebody else's.
+        look_at_m: where the nose points if targets turn it [m; east, north; mission origin]; None:
+            ahead.
     """
 
     def __init__(
@@ -154,13 +166,24 @@ class RepositionLeg(_Leg):
         speed_m_s: float,
         *,
         insists: bool = True,
+        look_at_m: tuple[float, float] | None = None,
     ) -> None:
         super().__init__(session, target_enu_m)
         self._insists = insists
         self._firmware = firmware
-        place = wgs84_from_enu(session.config.origin, target_enu_m)
-        self._message = firmware.reposition(*place, speed_m_s)
+        self._speed_m_s = speed_m_s
+        self._look_at_m = look_at_m if firmware.targets_turn_nose else None
+        self._heading_rad: float | None = None
+        """Of the nose, as it was told."""
+        self._turns = False
+        """Whether it was last told for its heading alone, which is no matter if it fails."""
+        self._takings = 0
         self._accepted = False
+
+    @property
+    def takings(self) -> int:
+        """How often the vehicle acknowledged a target on this leg; 0: not this one yet."""
+        return self._takings if self._accepted else 0
 
     @property
     def accepted(self) -> bool:
@@ -169,14 +192,44 @@ class RepositionLeg(_Leg):
 
     def start(self) -> None:
         """Tell the vehicle, in place of whatever it was told before."""
-        self._session.send(TARGET_TAG, self._message)
+        self._turns, self._heading_rad = False, self._bearing_rad()
+        self._send()
+
+    def _send(self) -> None:
+        place = wgs84_from_enu(self._session.config.origin, self._target_enu_m)
+        message = self._firmware.reposition(*place, self._speed_m_s, self._heading_rad)
+        self._session.send(TARGET_TAG, message)
+
+    def _bearing_rad(self) -> float | None:
+        """To what is looked at, clockwise from north; None where the nose is not turned there."""
+        if self._look_at_m is None or not math.isfinite(self._session.place_enu_m[0]):
+            return None
+        (east_m, north_m), place_enu_m = self._look_at_m, self._session.place_enu_m
+        return math.atan2(east_m - place_enu_m[0], north_m - place_enu_m[1])
+
+    def on_position(self, position: Position) -> None:
+        """Judge arrival, and keep the nose on what is looked at."""
+        super().on_position(position)
+        self._turn_nose()
+
+    def _turn_nose(self) -> None:
+        bearing_rad, told_rad = self._bearing_rad(), self._heading_rad
+        if bearing_rad is None or self.arrived or not self.accepted:
+            return
+        beside_rad = (
+            math.inf if told_rad is None else math.remainder(bearing_rad - told_rad, math.tau)
+        )
+        if abs(beside_rad) > _TURN_RAD and not self._session.commands.pending(TARGET_TAG):
+            self._turns, self._heading_rad = True, bearing_rad
+            self._send()
 
     def on_ended(self, ended: CommandEnded) -> None:
         """Take the outcome of the command."""
-        if ended.tag != TARGET_TAG:
+        if ended.tag != TARGET_TAG or self._turns:
             return
         if ended.ending is CommandOutcome.ACCEPTED:
             self._accepted = True
+            self._takings += 1
         else:
             why = self._firmware.place_refusal(self._session.vehicle, ended.result)
             self._failure = f"the autopilot did not take the target ({why})"
@@ -206,6 +259,7 @@ class PathLeg(RepositionLeg):
         path_enu_m: corners, then where to stop [m; mission origin].
         speed_m_s: cruise ground speed.
         insists: as for `RepositionLeg`.
+        look_at_m: as for that.
     """
 
     def __init__(
@@ -216,11 +270,14 @@ class PathLeg(RepositionLeg):
         speed_m_s: float,
         *,
         insists: bool = True,
+        look_at_m: tuple[float, float] | None = None,
     ) -> None:
         acceleration_m_s2 = session.acceleration_m_s2
         self._path = FlightPath(path_enu_m, session.corner_m, acceleration_m_s2, session.guard)
-        self._speed_m_s = speed_m_s
-        super().__init__(session, firmware, self._path.aim_enu_m, speed_m_s, insists=insists)
+        aim_enu_m = self._path.aim_enu_m
+        super().__init__(
+            session, firmware, aim_enu_m, speed_m_s, insists=insists, look_at_m=look_at_m
+        )
 
     def start(self) -> None:
         """Tell the vehicle where it is to fly now."""
@@ -238,14 +295,13 @@ class PathLeg(RepositionLeg):
             super().on_position(position)
         elif self.accepted:
             self._judge_stop(velocity_enu_m_s)
+            self._turn_nose()
 
     def _aim_at(self, target_enu_m: Point) -> None:
         moved, session = self._arrival.moved, self._session
         self._target_enu_m = target_enu_m
         self._arrival = ArrivalDetector(target_enu_m, session.config)
         self._arrival.moved = moved
-        place = wgs84_from_enu(session.config.origin, target_enu_m)
-        self._message = self._firmware.reposition(*place, self._speed_m_s)
         self._accepted = False
         self.start()
 
@@ -284,6 +340,11 @@ class _MissionLeg(_Leg):
         return self._failure or self._mission.failure
 
     @property
+    def takings(self) -> int:
+        """How often the vehicle has taken up missions; 0: not this one yet."""
+        return self._mission.takings if self.accepted else 0
+
+    @property
     def accepted(self) -> bool:
         """Whether the vehicle flies to it."""
         return self._mission.is_flown
@@ -304,11 +365,17 @@ def reposition_leg(
     speed_m_s: float,
     *,
     insists: bool,
+    look_at_m: tuple[float, float] | None = None,
 ) -> RepositionLeg:
     """To the end of that way, by one target or by one for each corner; see `RepositionLeg`."""
-    if len(way_enu_m) == 1:
-        return RepositionLeg(session, firmware, way_enu_m[0], speed_m_s, insists=insists)
-    return PathLeg(session, firmware, way_enu_m, speed_m_s, insists=insists)
+    if len(way_enu_m) > 1:
+        return PathLeg(
+            session, firmware, way_enu_m, speed_m_s, insists=insists, look_at_m=look_at_m
+        )
+    target_enu_m = way_enu_m[0]
+    return RepositionLeg(
+        session, firmware, target_enu_m, speed_m_s, insists=insists, look_at_m=look_at_m
+    )
 
 
 class Flying(Activity):
@@ -325,8 +392,16 @@ class Flying(Activity):
         else:
             insists = not firmware.pilots_stop_it_there
             way = (*order.via_enu_m, order.position_enu_m)
-            speed_m_s = session.cruise_speed_m_s
-            self._leg = reposition_leg(session, firmware, way, speed_m_s, insists=insists)
+            speed_m_s, look_at_m = session.cruise_speed_m_s, order.look_at_m
+            self._leg = reposition_leg(
+                session, firmware, way, speed_m_s, insists=insists, look_at_m=look_at_m
+            )
+
+    @property
+    def look(self) -> Look | None:
+        """As the order has it, level with its end."""
+        look_at_m, up_m = self.order.look_at_m, self.order.position_enu_m[2]
+        return None if look_at_m is None else Look((*look_at_m, up_m), self._leg.takings)
 
     @property
     def trigger_m(self) -> float | None:

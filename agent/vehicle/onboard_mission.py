@@ -116,6 +116,8 @@ class OnboardMission:
         """The vehicle flies missions, and which one is not known: it should be stopped."""
         self.coming_home = False
         """The wait at the target ran out, and the mission's own return began."""
+        self.takings = 0
+        """How often the vehicle was seen to take up a mission."""
         self.is_ours: bool | None = None
         """Whether the mission found on the vehicle is one of ours; None before it is known."""
 
@@ -294,6 +296,7 @@ class OnboardMission:
             if start.done:
                 start.cancel()
                 self._stage, self._start = _Stage.FLOWN, None
+                self.takings += 1
                 self._mode_seen, self._renewing, self._inherited = True, False, False
             elif start.failure is not None:
                 in_mission = self._firmware.is_mission(heartbeat.custom_mode)

@@ -265,7 +265,8 @@ class Episode:
         stay_s = self.random.choice((0.0, 5.0))
         order = GoTo(self._legs, place if inside else self._place(), stay_s, via_enu_m=via)
         trigger_m = self.random.choice((None, None, 0.0, 15.0))
-        return order if trigger_m is None else replace(order, trigger_m=trigger_m)
+        look_at_m = self.random.choice((None, None, (5.0, 5.0), (-20.0, 30.0)))
+        return replace(order, trigger_m=trigger_m, look_at_m=look_at_m)
 
     def _place(self) -> tuple[float, float, float]:
         random = self.random

@@ -80,6 +80,8 @@ from tests.support.phase_commands import (
     GIVES_WAY,
     IN_OUR_HANDS,
     LIMITS,
+    LOOK_AHEAD,
+    LOOK_AT,
     MISSION_ITEMS,
     MISSION_MESSAGES,
     MISSION_READING,
@@ -315,7 +317,9 @@ class BridgeWatch:
         if missions:
             allowed |= set[int]().union(*(COMMANDS_OF_MISSIONS.get(p, set()) for p in phases))
         if phases & IN_OUR_HANDS:
-            allowed.add(TRIGGER)
+            allowed |= {TRIGGER, LOOK_AHEAD}
+        if FlightPhase.FLYING in phases:
+            allowed.add(LOOK_AT)
         hold(message.command in allowed, f"commands {message.command} while {phases}")
         match message.command:
             case 192:

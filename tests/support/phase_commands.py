@@ -31,9 +31,9 @@ COMMANDS: dict[FlightPhase, set[int]] = {
 }
 """What may be commanded in each phase, beside requests for messages; motors are started
 while preparing only."""
-TRIGGER = 206
+TRIGGER, LOOK_AT, LOOK_AHEAD = 206, 195, 197
 IN_OUR_HANDS = COMMANDS.keys() - {FlightPhase.IDLE, FlightPhase.HANDED_OVER}
-"""In which a camera may be told to take pictures, or none."""
+"""In which a camera may be told to take pictures, or none, and to look at nothing."""
 COMMANDS_OF_MISSIONS: dict[FlightPhase, set[int]] = {
     FlightPhase.HOVERING: {SET_MODE, SPEED},
     FlightPhase.FLYING: {SET_MODE, SPEED},

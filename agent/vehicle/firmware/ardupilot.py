@@ -108,6 +108,7 @@ class ArduCopter(Firmware):
     missions_give_way = True
     """It flies to targets as in GUIDED, and to waypoints on a slower track."""
     missions_begin_anew = False
+    targets_turn_nose = False
     """Items are taken over one by one, and the number of the current one stays."""
 
     def has_rebooted(self, before: Heartbeat, heartbeat: Heartbeat) -> bool:

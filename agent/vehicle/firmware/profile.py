@@ -37,6 +37,8 @@ _COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
 _STATE_STANDBY = 3
 _CMD_DO_SET_MODE = 176
 _CMD_DO_CHANGE_SPEED = 178
+_CMD_DO_SET_ROI_LOCATION = 195
+_CMD_DO_SET_ROI_NONE = 197
 _CMD_DO_SET_CAM_TRIGG_DIST = 206
 _CMD_DO_REPOSITION = 192
 _CMD_DO_FENCE_ENABLE = 207
@@ -98,6 +100,8 @@ class Firmware(ABC):
     missions_begin_anew: ClassVar[bool]
     """One that takes the place of the mission that is flown is taken up as a whole, and flown from
     where it is marked to begin; else the vehicle goes on with the item of the same number."""
+    targets_turn_nose: ClassVar[bool]
+    """On the way to a target the nose points where that says, whatever is to be looked at."""
     acknowledged_twice: ClassVar[frozenset[int]] = frozenset()
     """Numbers of the commands that the firmware acknowledges twice."""
 
@@ -233,12 +237,27 @@ class Firmware(ABC):
         params = (distance_m, 0.0, now, 0.0, 0.0, 0.0, 0.0)
         return CommandLong(_CMD_DO_SET_CAM_TRIGG_DIST, params)
 
+    def look_at(self, lat_deg: float, lon_deg: float, alt_m: float) -> CommandInt:
+        """Keep the camera on a place, ``alt_m`` above mean sea level."""
+        params, place = (0.0, 0.0, 0.0, 0.0), (lat_deg, lon_deg, alt_m)
+        frame = AltitudeFrame.MEAN_SEA_LEVEL
+        return CommandInt(_CMD_DO_SET_ROI_LOCATION, frame, params, *place)
+
+    def look_ahead(self) -> CommandLong:
+        """Keep it on nothing any more."""
+        return CommandLong(_CMD_DO_SET_ROI_NONE, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
+
     @abstractmethod
     def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
         """Climb straight up to ``alt_m``; both heights are above mean sea level [m]."""
 
     def reposition(
-        self, lat_deg: float, lon_deg: float, alt_m: float, speed_m_s: float
+        self,
+        lat_deg: float,
+        lon_deg: float,
+        alt_m: float,
+        speed_m_s: float,
+        heading_rad: float | None = None,
     ) -> CommandInt:
         """Fly to a place at once.
 
@@ -248,9 +267,12 @@ class Firmware(ABC):
             alt_m: height above mean sea level, as the mission's own, so that home's height
                 does not matter.
             speed_m_s: cruise ground speed, for firmwares that take it with every target.
+            heading_rad: of the nose, clockwise from north, where targets say that; None: as the
+                vehicle is set.
         """
         speed, flags = self.reposition_params(speed_m_s)
-        params, place = (speed, flags, 0.0, math.nan), (lat_deg, lon_deg, alt_m)
+        yaw_rad = math.nan if heading_rad is None else heading_rad
+        params, place = (speed, flags, 0.0, yaw_rad), (lat_deg, lon_deg, alt_m)
         return CommandInt(_CMD_DO_REPOSITION, AltitudeFrame.MEAN_SEA_LEVEL, params, *place)
 
     @abstractmethod

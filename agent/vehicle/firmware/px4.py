@@ -104,6 +104,8 @@ class Px4Copter(Firmware):
     """It knows no such item."""
     missions_begin_anew = True
     """Taken over with its last item, current one included (`MavlinkMissionManager`)."""
+    targets_turn_nose = True
+    """What is looked at turns the nose in missions alone (`MissionBase::heading_sp_update`)."""
     acknowledged_twice = frozenset({_CMD_DO_SET_MODE})
     """Within a few milliseconds."""
 

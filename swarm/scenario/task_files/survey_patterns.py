@@ -24,10 +24,9 @@ from swarm.runtime.errors import Fault
 from swarm.scenario.findings import number_of
 from swarm.scenario.task_files.mission_items import Heights, above_ground, whole_of
 from swarm.scenario.task_files.task_file import Array, FileEntry, member, too_many_points
+from swarm.survey.structures import STRUCTURE_KIND
 
 TRANSECTS = "TransectStyleComplexItem"
-STRUCTURE_KIND = "structure"
-"""Kind of the closed lines round a structure, whose pictures are taken inwards."""
 _PREFIXES = {"survey": "survey", "CorridorScan": "corridor", "StructureScan": "structure"}
 _MOST_LINES = 100
 """A corridor or structure of more lines than that is refused."""
@@ -159,8 +158,8 @@ class PatternReader:
             return [Fault(self.source, place, problem, "draw it again in QGroundControl")]
         trigger = _trigger(camera, "AdjustedFootprintSide")
         self.notes.append(
-            f"{place}: lines round the structure are flown nose ahead; turn the camera to its "
-            "side, or fly the plans of --export, which look at it"
+            f"{place}: along lines round the structure the camera is pointed at its middle; a "
+            "vehicle without a gimbal turns its nose there"
         )
         return [
             FileEntry(

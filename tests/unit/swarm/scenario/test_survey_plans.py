@@ -188,8 +188,8 @@ def test_a_structure_is_one_closed_line_for_each_layer() -> None:
     assert around.bounds == pytest.approx((-10.0, -210.0, 30.0, -170.0), abs=1e-3)
     (note,) = found.notes
     assert note == (
-        "mission.items[0]: lines round the structure are flown nose ahead; "
-        "turn the camera to its side, or fly the plans of --export, which look at it"
+        "mission.items[0]: along lines round the structure the camera is pointed at its middle; "
+        "a vehicle without a gimbal turns its nose there"
     )
     assert {entry.table["kind"] for entry in found.entries} == {"structure"}
 
