@@ -30,7 +30,7 @@ _DENIED = int(mavlink.MAV_RESULT_DENIED)
 _FAILED = int(mavlink.MAV_RESULT_FAILED)
 _UNSUPPORTED = int(mavlink.MAV_RESULT_UNSUPPORTED)
 
-_LONG_ABOVE_HOME = frozenset({mavlink.MAV_CMD_NAV_TAKEOFF})
+_LONG_ABOVE_HOME = frozenset({mavlink.MAV_CMD_NAV_TAKEOFF, mavlink.MAV_CMD_DO_SET_ROI_LOCATION})
 """Commands whose height is above home when they come as COMMAND_LONG."""
 
 
@@ -90,7 +90,7 @@ class CommandExecutor:
         """Carry ``command`` out and acknowledge it."""
         is_camera = command.id == mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST
         if is_camera and self._pilot.flavour.missions.tells_camera:
-            self._pilot.camera.obey(command.params[0])
+            self._pilot.camera.trigger(command.params[0])
             return
         is_mode = command.id == mavlink.MAV_CMD_DO_SET_MODE
         times = self._pilot.flavour.modes.acknowledgements if is_mode else 1
@@ -126,7 +126,12 @@ class CommandExecutor:
                     return _DENIED
                 return _ACCEPTED if self.set_mission_current(int(seq), sender, now_s) else _FAILED
             case mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST:
-                return _ACCEPTED if self._pilot.camera.obey(command.params[0]) else _FAILED
+                return _ACCEPTED if self._pilot.camera.trigger(command.params[0]) else _FAILED
+            case mavlink.MAV_CMD_DO_SET_ROI_LOCATION:
+                return self._look_at(command)
+            case mavlink.MAV_CMD_DO_SET_ROI_NONE:
+                pilot.camera.look_at(None)
+                return _ACCEPTED
             case mavlink.MAV_CMD_DO_SET_HOME:
                 return self._set_home(command, now_s)
             case mavlink.MAV_CMD_GET_HOME_POSITION:
@@ -233,6 +238,18 @@ class CommandExecutor:
             return pilot.flavour.refusals.outside_fence
         own_speed = pilot.flavour.obeys_leg_speed and 0.0 < speed_m_s < math.inf
         pilot.fly_guided(target_enu_m, now_s, speed_m_s if own_speed else None)
+        yaw_rad = command.params[3]
+        own_heading = pilot.flavour.looks_in_missions_alone and math.isfinite(yaw_rad)
+        pilot.camera.on_target(math.degrees(yaw_rad) if own_heading else None)
+        return _ACCEPTED
+
+    def _look_at(self, command: AutopilotCommand) -> int:
+        """Keep the camera on a place; on nothing any more if that is zero in all."""
+        place_enu_m = self._place(command)
+        if place_enu_m is None:
+            return self._pilot.flavour.refusals.no_such_place
+        nowhere = command.lat_e7 == command.lon_e7 == 0 and command.height_m == 0.0
+        self._pilot.camera.look_at(None if nowhere else place_enu_m)
         return _ACCEPTED
 
     def _place(self, command: AutopilotCommand) -> Point | None:

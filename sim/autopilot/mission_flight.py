@@ -11,6 +11,7 @@ from sim.autopilot.events import FirmwareEvent
 from sim.autopilot.flight import FlightMode, Milestone
 from sim.autopilot.mission_item import StoredMissionItem, item_place_enu_m
 from sim.autopilot.parameters import ParameterRole
+from sim.autopilot.positions import place_wgs84_e7
 from sim.world.motion import Point
 
 if TYPE_CHECKING:
@@ -89,6 +90,7 @@ class MissionFlight:
     def give_way(self, now_s: float) -> None:
         """Stay where the vehicle is, and fly to the targets that are told."""
         self._after_climb = None
+        self._pilot.camera.on_target()
         self._pilot.let_targets(now_s)
 
     def land(self, now_s: float) -> None:
@@ -111,14 +113,30 @@ class MissionFlight:
 
     def trigger(self, item: StoredMissionItem) -> None:
         """Set the camera's trigger; where the camera is another component, tell that."""
-        self._pilot.camera.obey(item.params[0])
-        if self._behaviour.tells_camera:
-            params = *item.params[:3], 0.0, 0.0, 0.0, 0.0
-            self._pilot.outbox.broadcast(
-                mavlink.MAVLink_command_long_message(
-                    self._pilot.config.system_id, 0, item.command, 0, *params
-                )
+        self._pilot.camera.trigger(item.params[0])
+        self._tell_camera(item, (0.0, 0.0, 0.0))
+
+    def look(self, item: StoredMissionItem, now_s: float) -> None:
+        """Keep the camera on a place, or on none; where it is another component, tell that."""
+        if not item.is_place:
+            self._pilot.camera.look_at(None)
+            self._tell_camera(item, (0.0, 0.0, 0.0))
+            return
+        place_enu_m = self._place(item, now_s)
+        self._pilot.camera.look_at(place_enu_m)
+        lat_e7, lon_e7, alt_mm = place_wgs84_e7(self._pilot.config.origin, place_enu_m)
+        self._tell_camera(item, (lat_e7 / 1e7, lon_e7 / 1e7, alt_mm / 1e3))
+
+    def _tell_camera(self, item: StoredMissionItem, place: tuple[float, float, float]) -> None:
+        if not self._behaviour.tells_camera:
+            return
+        self._pilot.outbox.broadcast(
+            mavlink.MAVLink_command_long_message(
+                *(self._pilot.config.system_id, 0, item.command, 0),
+                *(*item.params[:3], 0.0),
+                *place,
             )
+        )
 
     def finish(self, now_s: float) -> None:
         """Stay where the last item ended: in the air, or on the ground with motors stopped."""

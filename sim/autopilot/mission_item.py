@@ -23,6 +23,7 @@ _PLACES = frozenset(
         mavlink.MAV_CMD_NAV_LOITER_TIME,
         mavlink.MAV_CMD_NAV_LAND,
         mavlink.MAV_CMD_NAV_TAKEOFF,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
     }
 )
 
@@ -31,8 +32,13 @@ _DONE_AT_ONCE = frozenset(
         mavlink.MAV_CMD_DO_CHANGE_SPEED,
         mavlink.MAV_CMD_DO_GUIDED_LIMITS,
         mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
+        mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
+        mavlink.MAV_CMD_DO_SET_ROI_NONE,
     }
 )
+
+LOOKS = frozenset({mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_ROI_NONE})
+"""Those that keep a camera on a place, or on none."""
 
 _GIVES_WAY = frozenset({mavlink.MAV_CMD_NAV_GUIDED_ENABLE, mavlink.MAV_CMD_DO_GUIDED_LIMITS})
 
@@ -47,6 +53,8 @@ _NAMES = {
     mavlink.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed",
     mavlink.MAV_CMD_DO_GUIDED_LIMITS: "GuidedLimits",
     mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST: "SetCamTrigDst",
+    mavlink.MAV_CMD_DO_SET_ROI_LOCATION: "SetROILocation",
+    mavlink.MAV_CMD_DO_SET_ROI_NONE: "SetROINone",
 }
 
 

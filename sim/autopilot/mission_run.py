@@ -10,7 +10,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from sim.autopilot.events import FirmwareEvent
 from sim.autopilot.flight import Milestone
 from sim.autopilot.mission_flight import MissionFlight
-from sim.autopilot.mission_item import StoredMissionItem
+from sim.autopilot.mission_item import LOOKS, StoredMissionItem
 
 if TYPE_CHECKING:
     from sim.autopilot.pilot import Pilot
@@ -210,6 +210,8 @@ class MissionRun:
                 if not self._behaviour.tells_camera:
                     seq += 1
                     continue
+            elif item.command in LOOKS:
+                self.flight.look(item, now_s)
             elif item.command == mavlink.MAV_CMD_DO_GUIDED_LIMITS:
                 self._limit_s = item.params[0]
             elif item.params[1] > 0.0:
@@ -298,8 +300,10 @@ class MissionRun:
         # Where returning leaves the mission, that is done at once too, and alone is told; so is
         # the trigger of another component's camera.
         returns = mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH if self._behaviour.forgets_mode else None
-        triggers = mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST if self._behaviour.tells_camera else None
-        if following is None or following.command not in (returns, triggers):
+        told = (
+            {mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST, *LOOKS} if self._behaviour.tells_camera else ()
+        )
+        if following is None or following.command not in (returns, *told):
             self._reached(seq, at_s)
         if item.command == mavlink.MAV_CMD_NAV_WAYPOINT:
             self._pilot.narrator.tell(FirmwareEvent.WAYPOINT_REACHED, seq=seq)

@@ -191,6 +191,7 @@ class MissionServer:
         old = self._store.items
         self._store.items = tuple(upload.items)
         self._acknowledge(upload.sender, mavlink.MAV_MISSION_ACCEPTED)
+        self._pilot.camera.on_mission()
         self._pilot.mission_uploaded(old, now_s)
 
     def _commit_fence(self, upload: _Upload, now_s: float) -> None:

@@ -212,9 +212,12 @@ class TelemetryReporter:
         return math.hypot(north_m_s, east_m_s)
 
     def _heading_cdeg(self, now_s: float) -> int:
-        """Heading 0..35999 [0.01 deg]: along the way flown last."""
+        """Heading 0..35999 [0.01 deg]: as it was told, else along the way flown last."""
         north_m_s, east_m_s, _ = self._velocity_ned_m_s(now_s)
-        if north_m_s or east_m_s:
+        told_deg = self._pilot.camera.heading_deg(now_s)
+        if told_deg is not None:
+            self._heading_deg = told_deg
+        elif north_m_s or east_m_s:
             self._heading_deg = math.degrees(math.atan2(east_m_s, north_m_s))
         return round(self._heading_deg * 100.0) % 36000
 

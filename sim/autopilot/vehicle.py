@@ -192,6 +192,7 @@ class SimulatedAutopilot:
             self._say(message_id, channel, now_s)
 
     def _on_mode_changed(self, now_s: float) -> None:
+        self.pilot.camera.on_target()
         if self._flavour.modes.told_at_once:
             self._say_heartbeat(now_s)
 

@@ -182,6 +182,7 @@ class ArduCopterModel(FirmwareModel):
         reposition_without_flag=mavlink.MAV_RESULT_DENIED,
         no_such_stream=mavlink.MAV_RESULT_DENIED,
         no_such_message=mavlink.MAV_RESULT_FAILED,
+        no_such_place=mavlink.MAV_RESULT_FAILED,
         outside_fence=mavlink.MAV_RESULT_FAILED,
     )
     failsafe_behaviour = FailsafeBehaviour(
@@ -206,6 +207,7 @@ class ArduCopterModel(FirmwareModel):
     take_off_above_home = True
     reads_frames = True
     forgets_speed = True
+    targets_end_look = True
     """Its position controller starts with the speed parameter at the first target."""
     tells_origin_when_armed = True
     coasting_s = 7.0

@@ -39,6 +39,8 @@ class RefusalCodes:
     """DO_REPOSITION that may not change the mode, in another mode."""
     no_such_stream: int
     """SET_MESSAGE_INTERVAL of a message it doesn't stream."""
+    no_such_place: int
+    """A region of interest whose place is none."""
     no_such_message: int
     """REQUEST_MESSAGE of a message it doesn't have."""
     outside_fence: int
@@ -107,7 +109,8 @@ class MissionBehaviour:
     """Whether a waypoint may say how near is near enough, rather than the parameter alone."""
     tells_camera: bool = False
     """Whether the trigger of a camera is that of another component: an item for it is told on, and
-    as reached; a command for it is left to that component, and not acknowledged."""
+    as reached; a command for it is left to that component, and not acknowledged. Items for regions
+    of interest are told on, too, and acknowledged to who commands one."""
     forgets_mode: bool = False
     """Whether the mode becomes another one at the end, or at an item that returns home."""
 
@@ -219,6 +222,11 @@ class FirmwareModel(ABC):
     """Whether DO_REPOSITION may give the speed of its leg."""
     pauses_anywhere: bool = False
     """Whether DO_REPOSITION without a place, height and heading stops the vehicle."""
+    targets_end_look: bool = False
+    """Whether a region of interest is forgotten with each new target and mode, rather than with a
+    new mission."""
+    looks_in_missions_alone: bool = False
+    """Whether it turns the nose in missions alone; elsewhere DO_REPOSITION may give a heading."""
     tells_origin_when_armed: bool = False
     home_follows_landing: bool = False
     """Whether home is where the vehicle landed, as soon as the motors stand and whoever put it

@@ -175,6 +175,7 @@ class Px4Model(FirmwareModel):
         reposition_without_flag=mavlink.MAV_RESULT_UNSUPPORTED,
         no_such_stream=mavlink.MAV_RESULT_FAILED,
         no_such_message=mavlink.MAV_RESULT_DENIED,
+        no_such_place=mavlink.MAV_RESULT_ACCEPTED,
         outside_fence=mavlink.MAV_RESULT_ACCEPTED,
     )
     disarm_delay_after_landing = ParameterRole.DISARM_LANDED_S
@@ -208,6 +209,7 @@ class Px4Model(FirmwareModel):
     )
 
     obeys_leg_speed = True
+    looks_in_missions_alone = True
     pauses_anywhere = True
     constant_position_at_rest = True
     home_follows_landing = True
