@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 
 from swarm.protocol.events import Publish
 from swarm.protocol.key_space import KeySpace
@@ -34,9 +34,12 @@ class Announcer:
         self._claim_key = KeySpace(register_writer.mission).claim(register_writer.writer)
         self._note = self._caution = ""
         self._turn = 0
+        self._claims_turn = False
         self._stretch = 1.0
         self._news: set[str] = set()
-        """Keys of own registers with something new since it was last repeated to anybody."""
+        """Keys of own registers whose content has been said once only."""
+        self._repeats_news = False
+        """Whether what else is news goes out again with what was just restated."""
         self._linked = True
         self._free_at_s = -math.inf
         """When somebody may be greeted again."""
@@ -70,7 +73,11 @@ class Announcer:
         """State the new content of an own register, or what is none: status and choice."""
         message = self._register_writer.say(body)
         if self._replica.join(message):
-            self._news.add(message.key)
+            if self._stretch > 1.0 and self._linked and message.key in self._news:
+                self._news.discard(message.key)
+                self._repeats_news = True
+            else:
+                self._news.add(message.key)
         return Publish(message)
 
     def stretch(self, stretch: float) -> None:
@@ -107,12 +114,14 @@ class Announcer:
         """Repeat the own registers, so that what got lost on the way arrives after all.
 
         Outcomes take turns, so that the bus stays quiet however many there are. In a fleet where
-        repetitions are stretched, everything but the claim does, and all that is new is told.
+        repetitions are stretched all that is new is told, and one more register: every other time
+        the claim, else one of the others.
         """
         own = list(self._replica.messages({self._register_writer.writer}))
         if self._stretch > 1.0:
-            always = {self._claim_key, *self._news}
-            at_once = 1
+            self._claims_turn = not self._claims_turn
+            always = self._news | ({self._claim_key} if self._claims_turn else set())
+            at_once = 0 if self._claims_turn else 1
         else:
             always = {m.key for m in own if isinstance(m.body, Claim | Calibration)}
             at_once = _OUTCOMES_AT_ONCE
@@ -121,9 +130,13 @@ class Announcer:
         for _ in range(min(at_once, len(rest))):
             self._turn = (self._turn + 1) % len(rest)
             said.append(rest[self._turn])
+        self._announce_at_s = now_s + self._stretch * self._timing.announce_s
+        return self._say_again(said)
+
+    def _say_again(self, said: Iterable[Message]) -> list[Publish]:
+        """Repeat these statements, all news among them."""
         if self._linked:
             self._news.clear()
-        self._announce_at_s = now_s + self._stretch * self._timing.announce_s
         return [
             self.say(message.body)
             if message.stamp.incarnation == REVOKED_INCARNATION
@@ -142,6 +155,10 @@ class Announcer:
     def repeat(self, status: Callable[[], Status], now_s: float, *, learned: bool) -> list[Publish]:
         """What is due again by now; registers only once they are ``learned`` to be news at all."""
         said: list[Publish] = []
+        if self._repeats_news:
+            self._repeats_news = False
+            news = filter(None, map(self._replica.register, sorted(self._news)))
+            said += self._say_again(list(news))
         if self._news and self._announce_at_s is not None:  # soon, however seldom the rest
             self._announce_at_s = min(self._announce_at_s, now_s + self._timing.announce_s)
         if learned and (self._announce_at_s is None or self._announce_at_s <= now_s):

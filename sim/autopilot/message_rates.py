@@ -1,7 +1,8 @@
 """Which messages each ground station gets how often.
 
-Messages are due on a grid of their own; a vehicle that is called too late skips what was missed
-instead of sending it in a burst, and keeps the grid.
+All messages of a channel are due on one grid, so that those whose intervals are multiples of one
+another go out together; a vehicle that is called too late skips what was missed instead of sending
+it in a burst, and keeps the grid.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ class MessageRates:
     def __init__(self) -> None:
         self._channels: dict[int, dict[int, list[float]]] = {}
         """Channel -> message id -> [interval, next due] in seconds."""
+        self._grids_s: dict[int, float] = {}
+        """An instant of each channel's grid."""
         self._deadline_s: float | None = math.inf
         """Cached; None when it has to be looked for again."""
 
@@ -27,21 +30,23 @@ class MessageRates:
         """Channels that are open."""
         return tuple(self._channels)
 
-    def open(self, channel: int, streams: Mapping[int, float], now_s: float) -> None:
-        """Serve a channel, with the streams that it gets unasked."""
+    def open(self, channel: int, streams: Mapping[int, float], now_s: float, grid_s: float) -> None:
+        """Serve a channel, with the streams that it gets unasked; ``grid_s`` is on its grid."""
         self._channels.setdefault(channel, {})
+        self._grids_s[channel] = grid_s
         for message_id, interval_s in streams.items():
             self.set_interval(channel, message_id, interval_s, now_s)
 
     def close(self, channel: int) -> None:
         """Stop serving a channel."""
         self._channels.pop(channel, None)
+        self._grids_s.pop(channel, None)
         self._deadline_s = None
 
     def set_interval(
         self, channel: int, message_id: int, interval_s: float | None, now_s: float
     ) -> None:
-        """Send a message at once and then every ``interval_s`` [s]; None stops it."""
+        """Send a message at once and then on the grid, every ``interval_s`` [s]; None stops it."""
         streams = self._channels.setdefault(channel, {})
         if interval_s is None:
             streams.pop(message_id, None)
@@ -69,10 +74,11 @@ class MessageRates:
             return
         self._deadline_s = None
         for channel, streams in self._channels.items():
+            grid_s = self._grids_s.get(channel, 0.0)
             for message_id, entry in streams.items():
                 interval_s, due_s = entry
                 if due_s <= now_s:
-                    missed = (now_s - due_s) // interval_s
-                    next_s = due_s + (missed + 1.0) * interval_s
+                    over = (now_s - grid_s) // interval_s
+                    next_s = grid_s + (over + 1.0) * interval_s
                     entry[1] = next_s if next_s > now_s else next_s + interval_s
                     yield channel, message_id

@@ -112,7 +112,7 @@ class SimulatedAutopilot:
             case MavlinkReceived(channel, message):
                 self._receive(channel, message, now_s)
             case Connected(channel):
-                self._streams.open(channel, self._flavour.unasked_streams, now_s)
+                self._streams.open(channel, self._flavour.unasked_streams, now_s, self._heartbeat_s)
                 if (
                     self._heartbeat_s > now_s and self._power_returns_s is None
                 ):  # otherwise it comes below
@@ -216,7 +216,7 @@ class SimulatedAutopilot:
         here = dataclasses.replace(self.config, start_enu_m=(east_m, north_m, ground_up_m))
         for channel in self._streams.channels:
             self._streams.close(channel)
-            self._streams.open(channel, self._flavour.unasked_streams, now_s)
+            self._streams.open(channel, self._flavour.unasked_streams, now_s, self._heartbeat_s)
         self._outbox.take()
         self._battery.stop(now_s)
         self._power_up(here, now_s)
