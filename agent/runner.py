@@ -22,6 +22,7 @@ from agent.core.interface import (
     OrderVehicle,
     Return,
     ReturnBegun,
+    Telemetry,
     VehicleOrder,
     VehicleReport,
 )
@@ -268,6 +269,8 @@ class _Flight:
             left_out=lambda: core.replica.overfull,
             save=self._keep,
             answer_s=answer_s,
+            together=lambda heard: heard,
+            settled=lambda: not core.is_contested,
         )
         core.dropped = _Dropped(self.shell)
 
@@ -291,6 +294,8 @@ class _Flight:
     def _report(self, news: VehicleReport) -> None:
         if isinstance(news, ReturnBegun):
             self.returns.set()
+        if not isinstance(news, Telemetry):  # most of all, what the next task is may follow
+            self.shell.gather()
         self.shell.step(news)
 
     def _failed(self, task: asyncio.Task[None]) -> None:

@@ -105,6 +105,7 @@ async def run_coordinator(
         save=None if save is None else lambda now_s: save(core.memory(now_s)),
         answer_s=answer_s,
         context=context,
+        together=lambda heard: heard,
     )
     log = get_logger(COORDINATOR, mission=mission.name)
 
@@ -119,6 +120,7 @@ async def run_coordinator(
         mission.constraints and not watches
     ):  # agents of earlier releases cannot read it, which shows there alone
         bus.subscribe(KeySpace(mission.name).status("*"), latest=True)
+    shell.suit_fleet(len(mission.uavs))
     try:
         return await shell.run()
     finally:

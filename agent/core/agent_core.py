@@ -46,6 +46,7 @@ from swarm.protocol.events import (
     KeysReplaced,
     LinkChanged,
     MessageReceived,
+    MessagesReceived,
     PeerGone,
     PeerSeen,
     PublishLast,
@@ -175,9 +176,10 @@ class AgentCore(AgentPart):
             self._mission_view.move(event)
             if not self._tasking.measure(now_s):
                 return []
-        if isinstance(event, MessageReceived) and self._is_repeated(event.message, now_s):
-            self._peers.heard(event.message, self.replica, now_s)
-            return []
+        if isinstance(event, MessageReceived | MessagesReceived) and self._is_idle(now_s):
+            event = self._sync.without_repeated(event, now_s)
+            if not event.messages:
+                return []
         if not self._machine.has_ended:
             if self._stall_detector.late(now_s):
                 self._sync.held_up(now_s)
@@ -248,6 +250,11 @@ class AgentCore(AgentPart):
         return self._machine.phase
 
     @property
+    def is_contested(self) -> bool:
+        """Whether what others claim matters at once: it has no task, or one not settled yet."""
+        return self.claim is not None and self.claim.phase is not ClaimPhase.HELD
+
+    @property
     def claim(self) -> Claim | None:
         """This UAV's claim register; None while it takes no tasks."""
         return self._tasking.claim
@@ -256,9 +263,10 @@ class AgentCore(AgentPart):
 
     def _handle(self, event: Event, now_s: float) -> None:
         match event:
-            case MessageReceived(message):
-                self._sync.hear(message, now_s)
-                self._near_traffic.hear(message, now_s)
+            case MessageReceived() | MessagesReceived():
+                for message in event.messages:
+                    self._sync.hear(message, now_s)
+                    self._near_traffic.hear(message, now_s)
             case SnapshotsReceived(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):
@@ -290,15 +298,6 @@ class AgentCore(AgentPart):
     def _is_place_alone(self, now_s: float) -> bool:
         """Whether nothing follows from where the vehicle is: known before, and nothing is due."""
         return self._mission_view.place_enu_m is not None and self._is_idle(now_s)
-
-    def _is_repeated(self, message: Message, now_s: float) -> bool:
-        """Whether nothing follows from ``message`` but that its writer lives.
-
-        Another UAV repeats what is known of it, whose word counts already, and nothing is due.
-        """
-        counts = self._peers.membership.is_credible(message.writer)
-        is_known = counts and self.replica.known(message) is message
-        return is_known and message.writer != COORDINATOR and self._is_idle(now_s)
 
     def _is_idle(self, now_s: float) -> bool:
         """Whether nothing is due."""

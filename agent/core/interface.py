@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from swarm.model import Zone
-from swarm.protocol.events import CommonAction, CommonEvent
+from swarm.protocol.events import CommonAction, CommonEvent, MessagesReceived
 
 
 @dataclass(frozen=True, slots=True)
@@ -324,6 +324,6 @@ class OrderVehicle:
     order: VehicleOrder
 
 
-Event = CommonEvent | VehicleReport
+Event = CommonEvent | MessagesReceived | VehicleReport
 
 Action = CommonAction | OrderVehicle

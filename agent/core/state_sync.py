@@ -15,7 +15,7 @@ from agent.core.context import AgentContext, AgentPart
 from agent.core.mission_view import MissionChange
 from agent.core.tasking import Tasking
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.events import Ask
+from swarm.protocol.events import Ask, MessageReceived, MessagesReceived
 from swarm.protocol.messages import (
     Body,
     Message,
@@ -84,6 +84,23 @@ class StateSync(AgentPart):
         is_word = self._replica.epoch_stamp != known or not self._mission_view.clock.is_set
         if is_word and isinstance(body, PlanEpoch) and body.phase is MissionPhase.RUNNING:
             self._set_clock(body.mission_s, now_s)
+
+    def without_repeated(
+        self, event: MessageReceived | MessagesReceived, now_s: float
+    ) -> MessagesReceived:
+        """What of that something may follow from but that its writer lives.
+
+        Nothing does where another UAV repeats what is known of it, and its word counts already.
+        """
+        news = []
+        for message in event.messages:
+            counts = self._peers.membership.is_credible(message.writer)
+            is_known = counts and self._replica.known(message) is message
+            if is_known and message.writer != COORDINATOR:
+                self._peers.heard(message, self._replica, now_s)
+            else:
+                news.append(message)
+        return MessagesReceived(tuple(news))
 
     def learn(self, snapshots: Sequence[Snapshot], now_s: float) -> None:
         """The answers to a question."""

@@ -39,6 +39,7 @@ from swarm.protocol.events import (
     LinkChanged,
     LogLine,
     MessageReceived,
+    MessagesReceived,
     PeerGone,
     PeerSeen,
     Save,
@@ -156,10 +157,9 @@ class CoordinatorCore:
 
     def _handle(self, event: CoordinatorEvent, now_s: float) -> None:
         match event:
-            case MessageReceived(message) if message.writer == COORDINATOR:
-                self._overhear(message, now_s)
-            case MessageReceived(message):
-                self._hear(message, now_s)
+            case MessageReceived() | MessagesReceived():
+                for message in event.messages:
+                    self._hear_any(message, now_s)
             case SnapshotsReceived(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer) if writer != COORDINATOR:
@@ -194,6 +194,12 @@ class CoordinatorCore:
                 self._actions += self._mission.end(reason, now_s)
             case _:
                 pass
+
+    def _hear_any(self, message: Message, now_s: float) -> None:
+        if message.writer == COORDINATOR:
+            self._overhear(message, now_s)
+        else:
+            self._hear(message, now_s)
 
     def _hear(self, message: Message, now_s: float) -> None:
         """Words of an agent, or of the operator."""

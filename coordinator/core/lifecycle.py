@@ -18,7 +18,7 @@ from swarm.model.layers import layers_over
 from swarm.model.plan import by_reason
 from swarm.protocol.board import TaskBoard, TaskState, anything_doable, is_of_field, mission_of
 from swarm.protocol.calibration import FlightRates, flight_rates, noticeably_otherwise
-from swarm.protocol.events import CommonAction, CommonEvent, LogLine
+from swarm.protocol.events import CommonAction, CommonEvent, LogLine, MessagesReceived
 from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import MissionConfig, MissionPhase, PlanEpoch
@@ -95,7 +95,7 @@ class TakeSeat:
     """Show that the coordinator is there, and answer for it."""
 
 
-CoordinatorEvent = CommonEvent | PlanMade | PlanFailed | Replanned | Withdraw
+CoordinatorEvent = CommonEvent | MessagesReceived | PlanMade | PlanFailed | Replanned | Withdraw
 CoordinatorAction = CommonAction | MakePlan | Replan | StopPlanning | TakeSeat
 
 

@@ -23,6 +23,7 @@ from swarm.protocol.events import (
     LinkChanged,
     LogLine,
     MessageReceived,
+    MessagesReceived,
     PeerGone,
     PeerSeen,
     SnapshotsReceived,
@@ -139,9 +140,10 @@ class StandbyCore:
 
     def _handle(self, event: CoordinatorEvent, now_s: float) -> None:
         match event:
-            case MessageReceived(message):
-                self._membership.heard(message.writer, now_s)
-                self._take_in(message, now_s)
+            case MessageReceived() | MessagesReceived():
+                for message in event.messages:
+                    self._membership.heard(message.writer, now_s)
+                    self._take_in(message, now_s)
             case SnapshotsReceived(snapshots):
                 self._state_query.answered()
                 for snapshot in snapshots:

@@ -12,6 +12,8 @@ from collections.abc import Iterator, Mapping
 
 _LEAST_INTERVAL_S = 0.001
 """Shorter intervals are taken as this one [s]."""
+_ROUNDING = 1e-6
+"""So little before an instant of the grid is that instant [intervals]."""
 
 
 class MessageRates:
@@ -78,7 +80,6 @@ class MessageRates:
             for message_id, entry in streams.items():
                 interval_s, due_s = entry
                 if due_s <= now_s:
-                    over = (now_s - grid_s) // interval_s
-                    next_s = grid_s + (over + 1.0) * interval_s
-                    entry[1] = next_s if next_s > now_s else next_s + interval_s
+                    over = math.floor((now_s - grid_s) / interval_s + _ROUNDING)
+                    entry[1] = grid_s + (over + 1) * interval_s
                     yield channel, message_id

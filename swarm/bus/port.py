@@ -281,12 +281,17 @@ class Bus(Protocol):
                 `MAX_PAYLOAD_BYTES`.
         """
 
-    def subscribe(self, key_expr: str, *, latest: bool = False) -> None:
+    def subscribe(self, key_expr: str, *, latest: bool = False, gathered: bool = False) -> None:
         """Receive a `Sample` for everything others publish on ``key_expr``.
 
         Own publications do not come back. ``latest`` keeps only the newest
-        unread sample of each key.
+        unread sample of each key. What is ``gathered`` waits outside of the inbox until `gather`,
+        and wakes nobody; if there is too much of it, the oldest is lost. To subscribe again
+        changes how it is kept, without a gap.
         """
+
+    def gather(self) -> None:
+        """Hand over to the inbox what has come for subscriptions that are ``gathered``."""
 
     def unsubscribe(self, key_expr: str) -> None:
         """Receive nothing more by that very subscription; fine if there is none.

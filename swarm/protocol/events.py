@@ -14,6 +14,19 @@ class MessageReceived:
 
     message: Message
 
+    @property
+    def messages(self) -> tuple[Message, ...]:
+        """It alone."""
+        return (self.message,)
+
+
+@dataclass(frozen=True, slots=True)
+class MessagesReceived:
+    """Several that have waited for each other, in large fleets; cores that do not say so never
+    hear of it."""
+
+    messages: tuple[Message, ...]
+
 
 @dataclass(frozen=True, slots=True)
 class SnapshotsReceived:

@@ -27,6 +27,7 @@ from swarm.protocol.events import (
     LinkChanged,
     LogLine,
     MessageReceived,
+    MessagesReceived,
     PeerGone,
     PeerSeen,
     Publish,
@@ -48,7 +49,7 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.registers import NO_ROOM
 from swarm.protocol.seal import Seal
-from swarm.protocol.timing import PRESETS, LinkKind
+from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind
 from swarm.protocol.uav_messages import News
 from swarm.runtime.clock import Clock
 from swarm.runtime.log import get_logger
@@ -56,6 +57,11 @@ from swarm.runtime.state_exchange import StateExchange, draw_nonce
 
 TURN = 20
 """Events from the bus between two looks at everything else."""
+GATHER_S = 0.1
+"""In a large fleet: wall time between two looks at what has come of claims, outcomes and board; a
+third of the time within which a normal network's claims may be contested."""
+GATHER_SETTLED_S = 0.5
+"""The same while nothing follows from them at once."""
 
 E_contra = TypeVar("E_contra", contravariant=True)
 A_co = TypeVar("A_co", covariant=True)
@@ -97,6 +103,11 @@ class Shell(Generic[E, A]):
         answer_s: how long a question waits for the slowest answer [wall s].
         context: what every note of the core is logged with, besides its own fields.
         draw_nonce: makes the nonce of a question, see swarm.protocol.sync.
+        together: makes the core's event of several messages that came one after the other. With
+            it the shell of a large fleet is not woken by each claim, outcome and task of the
+            board: it looks now and then, and before it decides anything by itself. None for a
+            core that wants to hear each when it comes.
+        settled: whether nothing would follow at once from what others claim.
     """
 
     def __init__(
@@ -118,6 +129,8 @@ class Shell(Generic[E, A]):
         answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
         context: Callable[[], Mapping[str, object]] = dict,
         draw_nonce: Callable[[], bytes] = draw_nonce,
+        together: Callable[[MessagesReceived], E] | None = None,
+        settled: Callable[[], bool] = lambda: True,
     ) -> None:
         self._core = core
         self._bus = bus
@@ -151,6 +164,13 @@ class Shell(Generic[E, A]):
         self._done: asyncio.Future[int] = self._loop.create_future()
         self._timer: asyncio.TimerHandle | None = None
         self._asking: set[asyncio.Task[None]] = set()
+        self._together = together
+        self._settled = settled
+        self._gathering: asyncio.TimerHandle | None = None
+        """Rings when it is time to look; None in small fleets."""
+        self._unread: deque[BusEvent] = deque()
+        self._heard: list[Message] = []
+        """What the core is still to hear of what was read."""
         self._events: deque[E] = deque()
         self._busy = False
         self._told_newer: set[str] = set()
@@ -179,8 +199,9 @@ class Shell(Generic[E, A]):
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            if self._timer is not None:
-                self._timer.cancel()
+            for timer in (self._timer, self._gathering):
+                if timer is not None:
+                    timer.cancel()
 
     def step(self, event: E) -> None:
         """Step the core and carry out what it wants; call from the loop's thread.
@@ -195,6 +216,20 @@ class Shell(Generic[E, A]):
         while self._events and not self._done.done():
             for action in self._core.step(self._events.popleft(), self._clock.now_s()):
                 self._carry_out(action)
+
+    def suit_fleet(self, n_uav: int) -> None:
+        """From now on hear as suits a fleet of that size; call from the loop's thread."""
+        if self._together is not None and self._gathering is None and n_uav > UNSTRETCHED_UAVS:
+            for key_expr in gathered_keys(self._keys):
+                self._bus.subscribe(key_expr, latest=True, gathered=True)
+            self._gathering = self._loop.call_later(GATHER_S, self._gather)
+
+    def gather(self) -> None:
+        """Let the core hear now what has come; call before something that it may decide by."""
+        if self._gathering is not None and not self._done.done():
+            self._bus.gather()
+            self._unread.extend(self._bus.inbox.take())
+            self._read(len(self._unread))
 
     def fail(self, fault: BaseException) -> None:
         """End `run` with ``fault``."""
@@ -302,8 +337,17 @@ class Shell(Generic[E, A]):
         deadline_s = self._core.next_deadline_s()
         if deadline_s is not None and not self._done.done():
             delay_s = self._clock.wall_delay_s(deadline_s - self._clock.now_s())
-            tick = self._from_bus(Tick())
-            self._timer = self._loop.call_later(max(0.0, delay_s), self.step, tick)
+            self._timer = self._loop.call_later(max(0.0, delay_s), self._tick)
+
+    def _tick(self) -> None:
+        self.gather()
+        self.step(self._from_bus(Tick()))
+
+    def _gather(self) -> None:
+        """Take what has come into the inbox, and look again later."""
+        self._bus.gather()
+        wait_s = GATHER_SETTLED_S if self._settled() else GATHER_S
+        self._gathering = self._loop.call_later(wait_s, self._gather)
 
     def _fail(self, task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (fault := task.exception()):
@@ -312,14 +356,28 @@ class Shell(Generic[E, A]):
     async def _hear(self) -> None:
         while True:
             await self._bus.inbox.wait()
-            events = self._bus.inbox.take()
+            self._unread.extend(self._bus.inbox.take())
             self._count()
-            for number, event in enumerate(events, 1):
-                fact = self._fact(event)
-                if fact is not None:
-                    self.step(self._from_bus(fact))
-                if number % TURN == 0:  # the vehicle must not wait for a flood of words
+            while self._unread:
+                self._read(TURN)
+                if self._unread:  # the vehicle must not wait for a flood of words
                     await asyncio.sleep(0)
+
+    def _read(self, most: int) -> None:
+        """Let the core hear the oldest that it has not, so many at most."""
+        for _ in range(min(most, len(self._unread))):
+            fact = self._fact(self._unread.popleft())
+            if isinstance(fact, MessageReceived) and self._gathering is not None:
+                self._heard.append(fact.message)
+            elif fact is not None:
+                self._tell_heard()
+                self.step(self._from_bus(fact))
+        self._tell_heard()
+
+    def _tell_heard(self) -> None:
+        if self._heard and self._together is not None:
+            heard, self._heard = self._heard, []
+            self.step(self._together(MessagesReceived(tuple(heard))))
 
     def _tell_newer(self) -> None:
         """Tell people once of each kind: it is no fault to be of another release."""
@@ -349,6 +407,8 @@ class Shell(Generic[E, A]):
                 if message is None:
                     return None
                 self._tell_newer()
+                if isinstance(message.body, SignedRoster):  # what came before was said before
+                    self._tell_heard()
                 self._heed([message])
                 self._expect([message])
                 return MessageReceived(message)
@@ -373,12 +433,18 @@ class Shell(Generic[E, A]):
             if isinstance(body, MissionConfig) and (self._briefed is None or stamp > self._briefed):
                 self._briefed = stamp
                 self._admission.fleet = frozenset(uav.id for uav in body.uavs)
+                self.suit_fleet(len(body.uavs))
 
     async def _ask(self, of: Sequence[str]) -> None:
         heed = partial(self._heed, answers=True)
         learned = await self._questions.ask(heed, of)
         self._expect(message for snapshot in learned for message in snapshot.messages)
         self.step(self._from_bus(SnapshotsReceived(learned)))
+
+
+def gathered_keys(keys: KeySpace) -> tuple[str, ...]:
+    """What everybody says with each decision, and what is only repeated."""
+    return keys.claim("*"), keys.outcome("*", "*"), keys.board("*")
 
 
 def join_mission(

@@ -116,6 +116,42 @@ def test_who_has_unsubscribed_hears_nothing_more(seats: Seats) -> None:
     run(seats, scenario)
 
 
+def test_what_is_gathered_wakes_nobody_until_it_is_asked_for(seats: Seats) -> None:
+    async def scenario(join: Join) -> None:
+        a, b = [Reader(await join()) for _ in range(2)]
+        key = "m/uav/u1/claim"
+        for key_expr in ("m/uav/*/claim", "end"):
+            b.bus.subscribe(key_expr, latest=True)
+        await settle(a, b)
+        a.bus.publish(key, b"told")
+        await b.until_event(Sample(key, b"told"))
+
+        b.bus.subscribe("m/uav/*/claim", latest=True, gathered=True)
+        await settle(a, b)
+        for payload in (b"old", b"new"):
+            a.bus.publish(key, payload)
+        a.bus.publish("end", b"1")
+        await b.until_event(Sample("end", b"1"))
+        assert b.payloads(key) == [b"told"]
+        b.bus.gather()
+        await b.until_event(Sample(key, b"new"))
+        assert b.payloads(key) == [b"told", b"new"]
+
+        b.bus.subscribe("m/uav/*/claim")
+        await settle(a, b)
+        a.bus.publish(key, b"told again")
+        await b.until_event(Sample(key, b"told again"))
+        b.bus.unsubscribe("m/uav/*/claim")
+        await settle(a, b)
+        a.bus.publish(key, b"unheard")
+        a.bus.publish("end", b"2")
+        await b.until_event(Sample("end", b"2"))
+        b.bus.gather()
+        assert b.payloads(key) == [b"told", b"new", b"told again"]
+
+    run(seats, scenario)
+
+
 def test_one_publishers_samples_keep_their_order(seats: Seats) -> None:
     async def scenario(join: Join) -> None:
         a, b = [Reader(await join()) for _ in range(2)]

@@ -45,6 +45,9 @@ class _Node:
     linked: bool = True
     subscribed: dict[str, bool] = field(default_factory=dict)
     """Key expression to whether only the newest samples are kept."""
+    gathered: dict[str, bool] = field(default_factory=dict)
+    """The same of what waits until it is gathered."""
+    waiting: list[Sample] = field(default_factory=list)
     watched: set[str] = field(default_factory=set)
     tokens: set[str] = field(default_factory=set)
     served: set[str] = field(default_factory=set)
@@ -127,6 +130,10 @@ class _Hub:
             ]
             for latest in lanes:
                 other.inbox.offer(sample, latest)
+            for key_expr in other.gathered:
+                if intersects(key_expr, sample.key):
+                    other.waiting.append(sample)
+                    break
 
     def declare_token(self, seat: _Node, key: str) -> None:
         others = self._reached_from(seat)
@@ -237,15 +244,27 @@ class MemoryBus:
         check_payload(payload)
         self._hub.publish(self._seat, Sample(check_key(key), bytes(payload)))
 
-    def subscribe(self, key_expr: str, *, latest: bool = False) -> None:
+    def subscribe(self, key_expr: str, *, latest: bool = False, gathered: bool = False) -> None:
         """Receive a `Sample` for everything others publish on ``key_expr``."""
         self._check_open()
-        self._seat.subscribed[check_key_expr(key_expr)] = latest
+        self.unsubscribe(key_expr)
+        kept = self._seat.gathered if gathered else self._seat.subscribed
+        kept[check_key_expr(key_expr)] = latest
+
+    def gather(self) -> None:
+        """See `swarm.bus.port.Bus`."""
+        self._check_open()
+        waiting, self._seat.waiting = self._seat.waiting, []
+        for sample in waiting:
+            for key_expr, latest in self._seat.gathered.items():
+                if intersects(key_expr, sample.key):
+                    self._seat.inbox.offer(sample, latest)
 
     def unsubscribe(self, key_expr: str) -> None:
         """See `swarm.bus.port.Bus`."""
         self._check_open()
         self._seat.subscribed.pop(check_key_expr(key_expr), None)
+        self._seat.gathered.pop(key_expr, None)
 
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token on ``key``."""

@@ -7,7 +7,7 @@ from collections.abc import AsyncIterator, Callable, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
-from swarm.protocol.events import CommonAction, CommonEvent, Finish, Stop, Tick
+from swarm.protocol.events import CommonAction, CommonEvent, Finish, MessagesReceived, Stop, Tick
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, Snapshot
 from swarm.runtime.shell import Shell, join_mission
@@ -91,6 +91,7 @@ async def at_work(
     left_out: Callable[[], int] = int,
     save: Callable[[float], None] | None = None,
     capacity: int = 4096,
+    together: Callable[[MessagesReceived], CommonEvent] | None = None,
 ) -> AsyncIterator[Played]:
     """A shell that runs ``core`` on the seat of u0, seen from the seat of u1."""
     network = MemoryNetwork()
@@ -117,6 +118,7 @@ async def at_work(
         register=register,
         left_out=left_out,
         save=save,
+        together=together,
     )
     running = asyncio.create_task(shell.run())
     try:

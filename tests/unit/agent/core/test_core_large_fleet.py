@@ -11,6 +11,7 @@ from swarm.protocol.events import (
     LinkChanged,
     LogLine,
     MessageReceived,
+    MessagesReceived,
     PeerGone,
     PeerSeen,
     Publish,
@@ -20,7 +21,7 @@ from swarm.protocol.messages import Message
 from swarm.protocol.sync import EVERYONE_UP_TO, SOME
 from swarm.protocol.timing import MOST_STATUS_STRETCH, UNSTRETCHED_UAVS, Timing, stretch_of
 from swarm.protocol.uav_messages import Claim, ClaimPhase, Outcome, Status
-from tests.support.builders import MISSION, entry, held, uav
+from tests.support.builders import MISSION, done, entry, held, uav
 from tests.support.lone_agent import LoneAgent, claims, notes, outcomes
 
 TIMING = Timing()
@@ -140,6 +141,36 @@ def test_a_uav_of_a_large_fleet_may_be_silent_longer_and_the_coordinator_may_not
 
     actions = agent.run_until(began_s + silence_s + 1.0)
     assert len(lost(actions)) == 99
+
+
+def test_messages_heard_together_are_learned_as_if_heard_one_by_one() -> None:
+    said = [held(f"t{n}", 50.0 + n) for n in range(1, 5)]
+    agents = fleet(30), fleet(30)
+    told = [agents[0].statement(f"u{n}", claim) for n, claim in enumerate(said, 1)]
+    told.append(agents[0].statement("u1", done("t1")))
+    for message in told:
+        agents[0].happen(MessageReceived(message))
+    agents[1].happen(MessagesReceived(tuple(told)))
+
+    one, other = (agent.core for agent in agents)
+    assert list(one.replica.messages()) == list(other.replica.messages())
+    assert one.next_deadline_s() == other.next_deadline_s()
+    arrived = [agent.arrive(agent.now_s - 200.0) for agent in agents]
+    assert [claim.task for claim in claims(arrived[0])] == ["t5"]
+    assert claims(arrived[0]) == claims(arrived[1])
+
+
+def test_what_is_only_repeated_among_messages_heard_together_keeps_its_writer_alive() -> None:
+    agent = fleet(30)
+    known = agent.statement("u1", held("t5", 50.0))
+    agent.happen(MessageReceived(known))
+    began_s = agent.now_s - 200.0
+    silence_s = stretch_of(30) * TIMING.silence_s
+    agent.run_until(began_s + 0.9 * silence_s)
+
+    assert agent.happen(MessagesReceived((known,))) == []
+    assert "u1" not in lost(agent.run_until(began_s + 1.5 * silence_s))
+    assert "u1" in lost(agent.run_until(began_s + 2.0 * silence_s))
 
 
 def test_a_word_that_is_only_repeated_keeps_its_writer_alive_and_changes_nothing_else() -> None:

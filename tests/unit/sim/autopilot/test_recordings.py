@@ -77,7 +77,11 @@ def test_px4_goes_through_the_recorded_states(name: str) -> None:
     real, simulated, _ = played(PLAYS[name])
 
     for message, fields in STATES.items():
-        assert states(simulated, message, *fields) == states(real, message, *fields)
+        recorded = states(real, message, *fields)
+        said = states(simulated, message, *fields)
+        # A recording may end before the last state is reported.
+        last = len(recorded) if message == "EXTENDED_SYS_STATE" else None
+        assert said[:last] == recorded
 
 
 METRES_PER_E7 = 1.11195e-2
