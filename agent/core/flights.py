@@ -24,13 +24,12 @@ from swarm.protocol.field_messages import BaseSpec, ZoneSpec
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import TaskEntry
 from swarm.protocol.operator_commands import zones_in_force
+from swarm.separation.slabs import planned_apart_m
 from swarm.survey.structures import structure_middle_m
 
 if TYPE_CHECKING:
     from swarm.allocation.legs.ground import Ground
 
-_SPOT_ROOM_M = 2.0
-"""Spots of a base are so much farther apart than UAVs in flight have to be [m]."""
 _AT_BASE_M = 25.0
 """Who is no farther from a base, or from its own spot there, is at it: agent.vehicle.standing."""
 
@@ -99,7 +98,7 @@ class Flights(AgentPart):
             fleet = [uav.id for uav in brief.uavs]
             verticals, least_m = self._verticals, brief.separation_m
             if least_m is not None:  # nobody lands or takes off too near to anybody else there
-                apart_m = max(verticals.apart_m, least_m + _SPOT_ROOM_M)
+                apart_m = max(verticals.apart_m, planned_apart_m(least_m))
                 verticals = replace(verticals, apart_m=apart_m)
             spot = verticals.spot(
                 base.position_enu_m,

@@ -9,7 +9,7 @@ from sim.faults.field_missions import random_field_mission
 from sim.world.engine import stream
 from swarm.model import Mission
 from swarm.separation.fleet_layers import fleet_layers_m
-from swarm.separation.slabs import layer_spacing_m
+from swarm.separation.slabs import planned_apart_m
 
 
 @lru_cache(maxsize=64)
@@ -25,7 +25,7 @@ def random_separated_mission(
     separation_m = round(float(rng.uniform(5.0, 12.0)), 1)
     lowest_m, layers = round(float(rng.uniform(15.0, 40.0)), 1), int(rng.integers(2, 6))
     for count in range(layers, layers + most[0]):
-        highest_m = lowest_m + (count - 1) * layer_spacing_m(separation_m) + 1.0
+        highest_m = lowest_m + (count - 1) * planned_apart_m(separation_m) + 1.0
         kept = replace(whole, separation_m=separation_m, band_m=(lowest_m, highest_m))
         try:
             fleet_layers_m(kept)

@@ -19,13 +19,20 @@ Path = npt.NDArray[np.float64]
 """(k, 3) corners of what a UAV flies [m; east, north, up from the mission origin]; one: it
 hovers."""
 
-HEIGHT_ERROR_M = 1.0
-"""By which a UAV may be higher or lower than it takes itself to be [m]."""
+POSITION_ERROR_M = 1.0
+"""By which a UAV may be elsewhere, or higher or lower, than it takes itself to be [m]."""
+_ROUNDED_M = 1e-6
+"""What is forgiven of a distance that was planned to be just as large as asked."""
 
 
-def layer_spacing_m(separation_m: float) -> float:
-    """Least distance of two shared layers [m]: that of two UAVs, both wrong in their heights."""
-    return separation_m + 2.0 * HEIGHT_ERROR_M
+def planned_apart_m(separation_m: float) -> float:
+    """How far from each other ways are planned, beside and above each other [m].
+
+    Both UAVs may be wrong about where they are. And who gives way in the air keeps a metre more
+    than the separation (swarm.separation.tactical_traffic): it would act all the time on ways
+    that are no farther apart than that.
+    """
+    return separation_m + 2.0 * POSITION_ERROR_M
 
 
 def shared_layers_m(
@@ -39,7 +46,7 @@ def shared_layers_m(
         band_m: lowest and greatest height [m]; None: from ``lowest_m`` up.
         lowest_m: height of the lowest layer where there is no band [m].
     """
-    spacing_m = layer_spacing_m(separation_m)
+    spacing_m = planned_apart_m(separation_m)
     if band_m is None:
         return tuple(lowest_m + index * spacing_m for index in range(n_uav))
     low_m, high_m = band_m
@@ -53,7 +60,7 @@ class Slabs:
     """The air, cut at heights between shared layers.
 
     Raises:
-        ValueError: heights do not grow by `layer_spacing_m` at least, or there are none.
+        ValueError: heights do not grow by `planned_apart_m` at least, or there are none.
     """
 
     separation_m: float
@@ -63,7 +70,7 @@ class Slabs:
 
     def __post_init__(self) -> None:
         gaps_m = np.diff(self.layers_m)
-        least_m = layer_spacing_m(self.separation_m) - 1e-6
+        least_m = planned_apart_m(self.separation_m) - _ROUNDED_M
         if not self.layers_m or (gaps_m < least_m).any():
             raise ValueError(f"layers {self.layers_m} are nearer than {least_m:g} m")
 
@@ -126,10 +133,11 @@ def apart(
         within: slabs that matter; None: all.
     """
     common = slabs.touched(one_enu_m) & slabs.touched(other_enu_m)
+    asked_m = planned_apart_m(slabs.separation_m) - _ROUNDED_M
     for slab in common if within is None else common & within:
         low_m, high_m = slabs.reach_m(slab)
         mine, its = _flat_pieces(one_enu_m, low_m, high_m), _flat_pieces(other_enu_m, low_m, high_m)
-        if len(mine) and len(its) and least_flat_m(mine, its) < slabs.separation_m:
+        if len(mine) and len(its) and least_flat_m(mine, its) < asked_m:
             return False
     return True
 

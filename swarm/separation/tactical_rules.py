@@ -9,7 +9,7 @@ import math
 
 from swarm.protocol.events import Cell
 from swarm.protocol.messages import MissionConfig
-from swarm.separation.slabs import HEIGHT_ERROR_M
+from swarm.separation.slabs import POSITION_ERROR_M, planned_apart_m
 from swarm.separation.tactical_motion import Agility, Place
 from swarm.separation.tactical_traffic import TrafficRules
 
@@ -32,14 +32,14 @@ def rules_of(brief: MissionConfig) -> TrafficRules | None:
     if brief.band_m is not None:
         high_m = max(high_m, low_m - brief.band_m[0] + brief.band_m[1])
     else:
-        high_m += 2.0 * (brief.separation_m + 2.0 * HEIGHT_ERROR_M)
+        high_m += 2.0 * planned_apart_m(brief.separation_m)
     return TrafficRules(
         brief.separation_m,
         fastest_m_s,
         Agility(slowest_m_s2),
-        HEIGHT_ERROR_M,
-        low_m=low_m - HEIGHT_ERROR_M,
-        high_m=high_m + HEIGHT_ERROR_M,
+        POSITION_ERROR_M,
+        low_m=low_m - POSITION_ERROR_M,
+        high_m=high_m + POSITION_ERROR_M,
     )
 
 
