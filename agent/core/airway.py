@@ -153,13 +153,21 @@ class Airway:
 
     # -- orders ----------------------------------------------------------------------------------
 
-    def order(self, order: VehicleOrder, *, own_height: bool = False, fixed: bool = False) -> None:
+    def order(
+        self,
+        order: VehicleOrder,
+        *,
+        own_height: bool = False,
+        fixed: bool = False,
+        takes_s: float | None = None,
+    ) -> None:
         """Pass ``order`` on, at once or when there is a way.
 
         Args:
             order: to the vehicle, heights in the layer of the brief.
             own_height: it ends at the height of a task.
             fixed: all of it is flown at the heights that it has.
+            takes_s: how long its way takes, as reckoned [s]; None: by its length.
         """
         claimed = self._replica.claims.get(self._uav) is not None
         if self._shared is None or not claimed or not isinstance(order, GoTo | Return):
@@ -177,7 +185,9 @@ class Airway:
         # Home, a vehicle goes down to its own layer above its start by itself.
         own_height |= isinstance(order, Return) and not order.land
         now_s, climbs = self._mission_view.now_s, self._at_own_height or own_height
-        self._wish = Wish(order, now_s, corners, own_height, fixed, climbs and not fixed)
+        self._wish = Wish(
+            order, now_s, corners, own_height, fixed, climbs and not fixed, takes_s=takes_s
+        )
         self._aside = None
         if not self._aloft:
             self._stands_at = self._stands_at or self._standing()
@@ -330,9 +340,10 @@ class Airway:
             if task is None and self._aloft and self._must_go(wish, waited_s):
                 self._actions.append(LogLine("flies where it may meet others", {}))
                 here = self._hover()
-                start, shift_m = here.path_enu_m[0], here.shift_m
-                path = shifted_path(start, wish.corners_enu_m, shift_m, wish.end_enu_m)
-                self._way = replace(here, number=self._number(), path_enu_m=path, flies=False)
+                ways = self._fleet.ways(air, wish, here.shift_m, aside=False, waits=False)
+                shift_m, corners = next(ways)
+                path = shifted_path(here.path_enu_m[0], corners, shift_m, wish.end_enu_m)
+                self._way = ClaimedWay(self._number(), path, shift_m=shift_m)
                 self._depart(wish)
                 self._wish = None
                 return []
@@ -389,9 +400,12 @@ class Airway:
         if me is None or me.endurance_s is None or math.isinf(end_s):
             return waited_s > LAST_RESORT_S
         end_s += _OF_RESERVE * me.reserve_frac * me.endurance_s
-        length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(wish.corners_enu_m))
-        way_s = length_m / me.speed_m_s + self._retry_s
-        return self._mission_view.mission_s(self._mission_view.now_s) + way_s > end_s
+        way_s = wish.takes_s
+        if way_s is None:
+            length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(wish.corners_enu_m))
+            way_s = length_m / me.speed_m_s
+        now_s = self._mission_view.mission_s(self._mission_view.now_s)
+        return now_s + way_s + self._retry_s > end_s
 
     def _stronger(self, air: SharedAir, wish: Wish) -> tuple[str, int] | None:
         """Who asks for what meets this UAV's request, with more right, and not seen before."""

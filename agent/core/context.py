@@ -73,6 +73,13 @@ class AgentPart:
     def _log(self, text: str, **fields: object) -> None:
         self._actions.append(LogLine(text, fields))
 
-    def _order(self, order: VehicleOrder, *, own_height: bool = False, fixed: bool = False) -> None:
+    def _order(
+        self,
+        order: VehicleOrder,
+        *,
+        own_height: bool = False,
+        fixed: bool = False,
+        takes_s: float | None = None,
+    ) -> None:
         """Let the vehicle obey; `Airway.order` says what the rest means."""
-        self._airway.order(order, own_height=own_height, fixed=fixed)
+        self._airway.order(order, own_height=own_height, fixed=fixed, takes_s=takes_s)

@@ -39,6 +39,8 @@ class Wish:
     """All of it is flown at the heights that it has."""
     climbs: bool = False
     """It leads to or from a height of a task's own."""
+    takes_s: float | None = None
+    """How long its way takes, as reckoned [s]; None: nobody has said."""
     retry_at_s: float = -math.inf
     asked: bool = False
     """Whether the own claim asks for it."""

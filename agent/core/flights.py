@@ -329,7 +329,8 @@ class Flights(AgentPart):
         via_enu_m = way.via_enu_m
         trigger_m = None if task is None or task.trigger_m is None else 0.0  # along the line only
         goes = GoTo(self.leg, way.end_enu_m, stay_s, idled, name, attempt, via_enu_m, trigger_m)
-        self._order(goes, own_height=task is not None and task.height_m is not None)
+        own_height = task is not None and task.height_m is not None
+        self._order(goes, own_height=own_height, takes_s=way.duration_s)
 
     def along_line(self, task: TaskEntry, attempt: int, *, backwards: bool) -> Point:
         """Fly the line of a task from end to end; gives where that is, without the layer."""

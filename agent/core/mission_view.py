@@ -222,14 +222,11 @@ class MissionView:
 
     @property
     def flown_m(self) -> float | None:
-        """Height at which it hovers out of its layer over the ground of the brief [m].
-
-        None: in its layer, or nobody looks at the ground.
-        """
-        brief, place_enu_m = self._replica.brief, self.place_enu_m
-        if brief is None or brief.terrain is None or place_enu_m is None:
+        """Height at which it hovers out of its layer [m above the origin]; None: in its layer."""
+        place_enu_m = self.place_enu_m
+        if place_enu_m is None or self.stands or not self._out_of_layer:
             return None
-        return place_enu_m[2] if self._out_of_layer and not self.stands else None
+        return place_enu_m[2]
 
     @property
     def _layer_m(self) -> float:

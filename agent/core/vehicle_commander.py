@@ -246,20 +246,24 @@ class VehicleCommander(AgentPart):
         """Zones have changed while it flies home: go on by another way."""
         home = self._tasking.way_home()
         if home is not None and self._machine.state not in PAUSED_BY_OPERATOR:
-            self._order(self._return(self._reason, None))
+            self._order(self._return(self._reason, None), takes_s=home.duration_s)
 
     def _turn_home(
         self, trigger: Trigger, reason: str, via_enu_m: Point | None, now_s: float
     ) -> None:
         """Order the return, from whatever the vehicle does now."""
-        before, order = self._machine.state, self._return(reason, via_enu_m)
+        before, order, home = (
+            self._machine.state,
+            self._return(reason, via_enu_m),
+            self._tasking.way_home(),
+        )
         if not self._machine.take(trigger):
             return
         if before not in HEADED_HOME:
             self._take_no_further_part(now_s)
         self._announcer.explain(reason)
         self._log("returning", reason=reason)
-        self._order(order)
+        self._order(order, takes_s=None if home is None else home.duration_s)
 
     def _return(self, reason: str, via_enu_m: Point | None) -> Return:
         """Home by the start, or at once; round zones to the nearest base where there are any."""

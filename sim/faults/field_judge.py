@@ -29,7 +29,7 @@ from sim.world.motion import Point, flown_s
 from sim.world.virtual_world import World
 from swarm.allocation.field import FieldProblem
 from swarm.model import Mission, Zone
-from swarm.model.layers import layers_over
+from swarm.separation.fleet_layers import fleet_layers_m
 
 if TYPE_CHECKING:
     import shapely
@@ -243,8 +243,7 @@ class Chances:
         blocked: Collection[str] = (),
         flaws: Sequence[VehicleFlaw] = (),
     ) -> None:
-        layers = layers_over(mission.terrain)
-        self._layers_m = [layers.layer_m(place) for place in range(len(mission.uavs))]
+        self._layers_m = fleet_layers_m(mission)
         self._mission, self._zero_s = mission, zero_s
         times = [1.0 / _slowest(flaws, uav.id) for uav in mission.uavs]
         self._drains = [_drain_frac(flaws, uav.id) for uav in mission.uavs]

@@ -42,6 +42,8 @@ _AT_REST: Point = (0.0, 0.0, 0.0)
 _ABOVE_M = 0.5
 """Who is nearer than that to a place, seen from above, is there [m]."""
 _SAME_BASE_M = 1.0
+_MOMENT_S = 0.5
+"""Its agent knows where it was so long ago, or later, and tells it to stop there [s]."""
 _TOLERANCE_S = 1e-6
 """Limits are inclusive: who lands at the very instant at which its battery is empty has landed."""
 
@@ -236,6 +238,8 @@ class FieldVehicle(TracedVehicle):
             self._climb(now_s)
         here = self._place_enu_m or stop_enu_m
         ends_m = self._layers_m[1], self._layer_m if self._paths.in_layer(name) else 0.0
+        if name is None and not via_enu_m and self._is_just_past(stop_enu_m):
+            ends_m = ends_m[0], ends_m[0]  # it stays where it is, which need not be in its layer
         path = self._paths.path(self._uav.id, (here, *via_enu_m, stop_enu_m), ends_m)
         self._layers_m, self._leaves_s = ends_m, now_s
         self._becomes_m = self._stops_astray_m(name)
@@ -244,6 +248,12 @@ class FieldVehicle(TracedVehicle):
         true = drifting(path.pieces(now_s), self._astray_m, self._becomes_m)
         self.track.fly(true, plus(stop_enu_m, self._becomes_m), now_s)
         return now_s + path.duration_s
+
+    def _is_just_past(self, place_enu_m: Point) -> bool:
+        """Whether it was there a moment ago at the most, or is there."""
+        here = self._place_enu_m
+        moment_m = self._uav.speed_m_s * _MOMENT_S
+        return here is not None and math.dist(here, place_enu_m) <= moment_m
 
     def _rest(self, now_s: float) -> None:
         """Stop where it is."""

@@ -193,7 +193,7 @@ class FieldNetwork:
             uav: its row.
             place_enu_m: (3,) place [m; ENU], its height as tasks give theirs, without the layer.
             flown_m: height there [m above the origin]; in the UAV's layer above it when None.
-                Over the ground the place's own height says that it is out of its layer.
+                The place's own height says that it is out of its layer.
         """
         model, network = self._kind_of(uav)
         placed = self._placed(uav, place_enu_m, flown_m)
@@ -241,7 +241,7 @@ class FieldNetwork:
             uav: its row.
             corners_enu_m: (k, 3) as `corners_from_m` gives them.
             end: the node.
-            out_of_layer: over the ground, that the height of the first corner is the one flown.
+            out_of_layer: that the height of the first corner is the one flown.
         """
         layer_m = self._layers_m[uav]
         piece_m = np.hypot(*np.diff(corners_enu_m[:, :2], axis=0).T)
