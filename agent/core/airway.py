@@ -11,7 +11,6 @@ In any other mission orders pass as they are.
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
@@ -49,10 +48,6 @@ STOP_LEG = 0
 """Of orders that are this module's own; those of the core are numbered from 1."""
 GIVES_UP_S = 10.0
 """How long a UAV waits for a way to a task before it looks for another task [s]."""
-LAST_RESORT_S = 300.0
-"""How long one that is to come home waits for a way before it comes without [s]."""
-_OF_RESERVE = 0.25
-"""Share of the reserve that a wait for the way home may use up."""
 _ASIDE_PATIENCE = 4.0
 """How long it waits for its way aside, in intervals at which it asks anew."""
 
@@ -96,6 +91,8 @@ class Airway:
         self._aside: Wish | None = None
         """It makes room, before its wish is asked again."""
         self._granted: dict[str, int] = {}
+        self._keeps: tuple[int, ...] = ()
+        """Seats that it has taken over."""
         self._stands_at: tuple[str, BaseStage] | None = None
         """Where it stands until its way up is granted."""
         self._lifts_enu_m: Point | None = None
@@ -148,6 +145,7 @@ class Airway:
         """
         if self._way is None and claim.way is not None:
             self._way, self._granted = claim.way, dict(claim.way.grants)
+            self._keeps = claim.way.keeps
             self._aloft = bool(claim.way.path_enu_m) and (claim.way.flies or not claim.way.grounded)
             self._moves = bool(claim.way.path_enu_m)
 
@@ -190,7 +188,7 @@ class Airway:
         )
         self._aside = None
         if not self._aloft:
-            self._stands_at = self._stands_at or self._standing()
+            self._stands_at = self._stands_at or self._fleet.standing()
         if self._moves and self._aloft and not self._stops:
             self._stop()
 
@@ -252,15 +250,8 @@ class Airway:
             if claim.task is not None:
                 departs_s = self._mission_view.mission_s(self._mission_view.now_s)
                 claim = replace(claim, departs_s=departs_s)
-        return replace(claim, way=replace(self._told_way, grants=dict(self._granted)))
-
-    def _standing(self) -> tuple[str, BaseStage] | None:
-        """Base and stage of who stands there, by its own last word."""
-        claim = self._replica.claims.get(self._uav)
-        stands = claim is not None and claim.stage in (BaseStage.LANDED, BaseStage.PARKED)
-        return (
-            (claim.base, claim.stage) if stands and claim and claim.base and claim.stage else None
-        )
+        way = replace(self._told_way, grants=dict(self._granted), keeps=self._keeps)
+        return replace(claim, way=way)
 
     def settle(self, now_s: float) -> list[Refused]:
         """What follows from the claims: whom to grant, where to go, and what is told of it.
@@ -275,9 +266,9 @@ class Airway:
             return []
         self._fleet.note_losses()
         refused = self._press(air, now_s)
-        self._granted = air.granted(
-            self._uav, self._claims(), self._granted, self._fleet.heard(), self._fleet.expired()
-        )
+        others = self._fleet.heard(), self._fleet.expired()
+        self._keeps = air.inherited(self._uav, self._claims(), *others)
+        self._granted = air.granted(self._uav, self._claims(), *others)
         self._depart_if_granted(air, now_s)
         return refused
 
@@ -337,7 +328,8 @@ class Airway:
                 self._way = self._hover()
                 self._actions.append(LogLine("no way", {"task": task}))
                 return [Refused(wish.order, "no way there becomes free")]
-            if task is None and self._aloft and self._must_go(wish, waited_s):
+            end_s = self.sortie_end_s()
+            if task is None and self._aloft and self._fleet.must_go(wish, end_s, self._retry_s):
                 self._actions.append(LogLine("flies where it may meet others", {}))
                 here = self._hover()
                 ways = self._fleet.ways(air, wish, here.shift_m, aside=False, waits=False)
@@ -351,7 +343,7 @@ class Airway:
         return []
 
     def _pursue(self, air: SharedAir, wish: Wish, now_s: float) -> None:
-        rival = self._stronger(air, wish) if wish.asked else None
+        rival = self._fleet.stronger(air, wish, self._claims()) if wish.asked else None
         if rival is not None:
             wish.yielded.add(rival)
         if not wish.asked or rival is not None or wish.retry_at_s <= now_s:
@@ -371,8 +363,8 @@ class Airway:
                 continue
             array = np.array(path)
             grounded = not self._aloft
-            keepers = air.keepers(array, claims, expired, grounded=grounded)
-            if not all(keeper is not None and self._fleet.reaches(keeper) for keeper in keepers):
+            reaches = self._fleet.reaches
+            if not air.can_grant(array, claims, expired, reaches, grounded=grounded):
                 continue
             asked = ClaimedWay(self._number(), path, False, grounded, shift_m)
             if air.is_free(self._uav, array, claims, expired, grounded=grounded):
@@ -393,32 +385,6 @@ class Airway:
                 self._wish.asked = False
             wish.asked = True
             self._way = asked
-
-    def _must_go(self, wish: Wish, waited_s: float) -> bool:
-        """Whether it would fall if it waited any longer: none of the reserve is left for that."""
-        me, end_s = self._mission_view.me, self.sortie_end_s()
-        if me is None or me.endurance_s is None or math.isinf(end_s):
-            return waited_s > LAST_RESORT_S
-        end_s += _OF_RESERVE * me.reserve_frac * me.endurance_s
-        way_s = wish.takes_s
-        if way_s is None:
-            length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(wish.corners_enu_m))
-            way_s = length_m / me.speed_m_s
-        now_s = self._mission_view.mission_s(self._mission_view.now_s)
-        return now_s + way_s + self._retry_s > end_s
-
-    def _stronger(self, air: SharedAir, wish: Wish) -> tuple[str, int] | None:
-        """Who asks for what meets this UAV's request, with more right, and not seen before."""
-        claims, mine = self._claims(), self._told_way
-        if mine.flies:
-            return None
-        path = air.wanted(self._uav, mine)
-        own = strength(self._uav, claims)
-        for uav in air.in_the_way(self._uav, path, claims, self._fleet.expired()):
-            asks = uav, air.way(uav, claims).number
-            if strength(uav, claims) < own and asks not in wish.yielded:
-                return asks
-        return None
 
     def _make_room(self, air: SharedAir, now_s: float) -> bool:
         """Step aside for who asks for where this UAV hovers, unless it is at work.
@@ -450,7 +416,7 @@ class Airway:
         wish, way = self._aside or self._wish, self._told_way
         if wish is None or not wish.asked or way.flies or self._stops:
             return
-        if air.is_granted(self._uav, self._claims(), self._granted, self._fleet.expired()):
+        if air.is_granted(self._uav, self._claims(), self._fleet.expired()):
             self._depart(wish)
             if now_s > wish.since_s and wish is not self._aside:
                 self.when_departed()

@@ -5,8 +5,9 @@ Leaves out: asking, granting and setting off (agent.core.airway).
 
 from __future__ import annotations
 
+import itertools
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
 from agent.core.interface import GoTo, Return
@@ -15,11 +16,15 @@ from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
-from swarm.protocol.uav_messages import ClaimPhase
-from swarm.separation.shared_air import SharedAir, air_of_brief, is_home
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
+from swarm.separation.shared_air import SharedAir, air_of_brief, is_home, strength
 
 ENDLESS_S = 1800.0
-"""How long the way of a lost UAV stays taken whose battery has no end [s]."""
+"""How long the way of a lost UAV stays taken whose battery has no end, or is changed [s]."""
+LAST_RESORT_S = 300.0
+"""How long one that is to come home waits for a way before it comes without [s]."""
+_OF_RESERVE = 0.25
+"""Share of the reserve that a wait for the way home may use up."""
 _ASIDE_M = (1.5, 3.0, 6.0, 12.0)
 """How far somebody steps aside, in separations."""
 _DIRECTIONS = 8
@@ -115,6 +120,32 @@ class FleetAir:
                 there = east_m + away_m * math.cos(angle), north_m + away_m * math.sin(angle), up_m
                 yield from ((shift_m, (wish.corners_enu_m[0], there)) for shift_m in shifts_m)
 
+    def must_go(self, wish: Wish, sortie_end_s: float, retry_s: float) -> bool:
+        """Whether it would fall if it waited any longer: none of the reserve is left for that.
+
+        Args:
+            wish: for a way home.
+            sortie_end_s: by when it must have landed, its reserve kept [s mission time].
+            retry_s: how long it takes until it looks again [s].
+        """
+        me = self._mission_view.me
+        if me is None or me.endurance_s is None or math.isinf(sortie_end_s):
+            return self._mission_view.now_s - wish.since_s > LAST_RESORT_S
+        way_s = wish.takes_s
+        if way_s is None:
+            length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(wish.corners_enu_m))
+            way_s = length_m / me.speed_m_s
+        falls_s = sortie_end_s + _OF_RESERVE * me.reserve_frac * me.endurance_s
+        return self._mission_s + way_s + retry_s > falls_s
+
+    def standing(self) -> tuple[str, BaseStage] | None:
+        """Base and stage of who stands there, by its own last word."""
+        claim = self._replica.claims.get(self._uav)
+        stands = claim is not None and claim.stage in (BaseStage.LANDED, BaseStage.PARKED)
+        return (
+            (claim.base, claim.stage) if stands and claim and claim.base and claim.stage else None
+        )
+
     # -- the others ------------------------------------------------------------------------------
 
     def note_losses(self) -> None:
@@ -127,15 +158,35 @@ class FleetAir:
                 self._lost_s.setdefault(uav.id, self._mission_s)
 
     def expired(self) -> set[str]:
-        """Who was lost so long ago that it can't be in the air any more."""
+        """Who was lost so long ago that it can't be in the air any more.
+
+        Where there are bases it may have got another battery since.
+        """
         if not self._lost_s or self._brief is None:
             return set()
+        endless = bool(self._brief.bases)
         return {
             uav.id
             for uav in self._brief.uavs
             if uav.id in self._lost_s
-            and self._mission_s - self._lost_s[uav.id] > (uav.endurance_s or ENDLESS_S)
+            and self._mission_s - self._lost_s[uav.id]
+            > (ENDLESS_S if endless or uav.endurance_s is None else uav.endurance_s)
         }
+
+    def stronger(
+        self, air: SharedAir, wish: Wish, claims: Mapping[str, Claim]
+    ) -> tuple[str, int] | None:
+        """Who asks for what meets this UAV's request, with more right, and not seen before."""
+        mine = air.way(self._uav, claims)
+        if mine.flies:
+            return None
+        path = air.wanted(self._uav, mine)
+        own = strength(self._uav, claims)
+        for uav in air.in_the_way(self._uav, path, claims, self.expired()):
+            asks = uav, air.way(uav, claims).number
+            if strength(uav, claims) < own and asks not in wish.yielded:
+                return asks
+        return None
 
     def reaches(self, uav: str) -> bool:
         """Whether ``uav`` could hear a request."""
@@ -149,11 +200,13 @@ class FleetAir:
         """Who is to keep this UAV's air: somebody who is heard, best one who takes part."""
         claims = self._replica.claims
         by_part: dict[bool, list[str]] = {True: [], False: []}
-        for uav in () if self._brief is None else self._brief.uavs:
-            claim = claims.get(uav.id)
-            heard = uav.id != self._uav and self.reaches(uav.id)
+        fleet = [] if self._brief is None else [uav.id for uav in self._brief.uavs]
+        after = 1 + fleet.index(self._uav) if self._uav in fleet else 0
+        for uav in (*fleet[after:], *fleet[:after]):
+            claim = claims.get(uav)
+            heard = uav != self._uav and self.reaches(uav)
             if heard and claim is not None and not is_home(claim):
-                by_part[claim.phase is not ClaimPhase.OUT].append(uav.id)
+                by_part[claim.phase is not ClaimPhase.OUT].append(uav)
         return next(iter((*by_part[True], *by_part[False])), None)
 
     @property

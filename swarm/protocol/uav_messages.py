@@ -208,6 +208,8 @@ class ClaimedWay(Checked):
     """What it has granted as a keeper of air: by UAV the number of its request."""
     heir: Id | None = None
     """Who keeps its air from now on, as it is home for good."""
+    keeps: tuple[Count, ...] = ()
+    """Seats that it has taken over from other keepers of air, with all that these had granted."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,16 +1,17 @@
 """Who keeps which slab of air, what air is taken, and what a keeper grants.
 
-Each slab of air has one keeper at a time, a UAV of the fleet. Nobody flies anywhere before the
-keepers of all slabs that the way leads through have granted it, and a keeper grants nothing that
-comes near to what it has granted before and is not known to be over. So ways that are flown are
-apart whatever is lost, late or doubled on the bus, and however clocks differ: see README.md.
+Each slab of air has three seats, or one, on each of which one UAV of the fleet sits at a time.
+Nobody flies anywhere before most of those who sit in each slab that the way leads through have
+granted it, and who sits there grants nothing that comes near to what it has granted before and is
+not known to be over. Any two majorities share a seat, so ways that are flown are apart whatever is
+lost, late or doubled on the bus, and however clocks differ: see README.md.
 
 Leaves out: which way is asked for, and when a vehicle departs (agent.core.airway).
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,7 +19,7 @@ import numpy as np
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
-from swarm.separation.slabs import Path, Slabs, apart, keeper_rows, shared_layers_m
+from swarm.separation.slabs import Path, Slabs, apart, keeper_seats, shared_layers_m
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,7 +42,14 @@ class SharedAir:
     def __init__(self, slabs: Slabs, fleet: Sequence[Starter]) -> None:
         self.slabs = slabs
         self._uavs = [starter.uav for starter in fleet]
-        self._first = keeper_rows(len(slabs), len(fleet))
+        rows = keeper_seats(len(slabs), len(fleet))
+        self._first = [self._uavs[row] for each in rows for row in each]
+        """By seat, who sits there first."""
+        self._slab_of = [slab for slab, each in enumerate(rows) for _ in each]
+        self._seats = [
+            [seat for seat, its in enumerate(self._slab_of) if its == slab]
+            for slab in range(len(slabs))
+        ]
         self._unsaid = {
             starter.uav: ClaimedWay(0, (starter.hovers_enu_m,), flies=True) for starter in fleet
         }
@@ -99,73 +107,147 @@ class SharedAir:
 
     # -- who keeps it ----------------------------------------------------------------------
 
-    def keeper(
-        self, slab: int, claims: Mapping[str, Claim], expired: Collection[str]
+    def holder(
+        self, seat: int, claims: Mapping[str, Claim], expired: Collection[str]
     ) -> str | None:
-        """Who keeps ``slab``; None: nobody is left in the air."""
-        return self._line(slab, claims, expired)[-1]
+        """Who sits on a seat; None: nobody is left in the air."""
+        return self._line(seat, claims, expired)[-1]
 
     def _line(
-        self, slab: int, claims: Mapping[str, Claim], expired: Collection[str]
+        self, seat: int, claims: Mapping[str, Claim], expired: Collection[str]
     ) -> list[str | None]:
-        """All who have kept ``slab``, one after the other, up to who keeps it now.
+        """All who have sat there, one after the other, up to who does now.
 
         Who is home for good has named an heir; of who has not, or can't be there any more, it is
-        the next one in the brief's order.
+        the next one in the brief's order. Who says that it has taken over sits there.
         """
         line: list[str | None] = []
-        uav = self._uavs[self._first[slab]]
-        while uav in expired or is_home(claims.get(uav)):
+        uav = self._first[seat]
+        while True:
+            after = self._taken_over(seat, uav, claims)
+            if after is None or after in line:
+                if not (uav in expired or is_home(claims.get(uav))):
+                    return [*line, uav]
+                after = self.way(uav, claims).heir
             line.append(uav)
-            heir = self.way(uav, claims).heir
-            if heir is None or heir in line or heir not in self._unsaid:
-                after = self._uavs.index(uav)
-                order = [*self._uavs[after + 1 :], *self._uavs[:after]]
-                heir = next((each for each in order if each not in line), None)
-            if heir is None:
+            if after is None or after in line or after not in self._unsaid:
+                here = self._uavs.index(uav)
+                order = [*self._uavs[here + 1 :], *self._uavs[:here]]
+                after = next((each for each in order if each not in line), None)
+            if after is None:
                 return [*line, None]
-            uav = heir
-        return [*line, uav]
+            uav = after
 
-    def keepers(
+    def _taken_over(self, seat: int, uav: str, claims: Mapping[str, Claim]) -> str | None:
+        """Who else says that it sits there; it must have taken ``uav`` for gone."""
+        return next(
+            (
+                other
+                for other in self._uavs
+                if other != uav
+                and seat in self.way(other, claims).keeps
+                and not is_home(claims.get(other))
+            ),
+            None,
+        )
+
+    def can_grant(
         self,
         path: Path,
         claims: Mapping[str, Claim],
         expired: Collection[str],
+        reaches: Callable[[str], bool],
         *,
         grounded: bool = False,
-    ) -> set[str | None]:
-        """Whose grants a way takes; None among them: there is nobody to ask."""
-        asked = self.slabs.asked(path, grounded=grounded)
-        return {self.keeper(slab, claims, expired) for slab in asked}
+    ) -> bool:
+        """Whether enough of those who keep the air of ``path`` could hear a request."""
+        for slab in self.slabs.asked(path, grounded=grounded):
+            holders = [self.holder(seat, claims, expired) for seat in self._seats[slab]]
+            heard = sum(holder is not None and reaches(holder) for holder in holders)
+            if heard < _majority(len(holders)):
+                return False
+        return True
 
-    def kept(
-        self, uav: str, claims: Mapping[str, Claim], expired: Collection[str]
-    ) -> frozenset[int]:
-        """Slabs that ``uav`` keeps.
+    def inherited(
+        self,
+        uav: str,
+        claims: Mapping[str, Claim],
+        heard: Collection[str],
+        expired: Collection[str],
+    ) -> tuple[int, ...]:
+        """Seats that ``uav`` has taken over, and may grant by.
 
-        As an heir only once it knows of all that those before it had granted.
+        Those of its last word that are still its own, and others once it knows of all that those
+        who sat there had granted, and what it has granted itself for other slabs fits in there.
         """
+        told = self.way(uav, claims).keeps
         found = []
-        for slab in range(len(self.slabs)):
-            *before, now = self._line(slab, claims, expired)
-            if now == uav and all(
-                each is None or self._is_settled(each, claims, expired) for each in before
-            ):
-                found.append(slab)
-        return frozenset(found)
+        for seat in range(len(self._first)):
+            *before, now = self._line(seat, claims, expired)
+            if now != uav or not before:
+                continue
+            known = all(each and self._is_settled(each, claims, heard, expired) for each in before)
+            if seat in told or (known and self._fits(uav, self._slab_of[seat], claims, expired)):
+                found.append(seat)
+        return tuple(found)
 
     def _is_settled(
-        self, keeper: str, claims: Mapping[str, Claim], expired: Collection[str]
+        self,
+        keeper: str,
+        claims: Mapping[str, Claim],
+        heard: Collection[str],
+        expired: Collection[str],
     ) -> bool:
-        """Whether all requests that it had granted are known, or over."""
+        """Whether all requests that it had granted are known, or over.
+
+        What one that is gone has granted is known of those alone who are heard.
+        """
         if keeper in expired:
-            return True
+            return all(
+                uav in heard or uav in expired or is_home(claims.get(uav)) for uav in self._uavs
+            )
         granted = self.way(keeper, claims).grants
         return all(
             uav in expired or uav not in self._unsaid or self.way(uav, claims).number >= number
             for uav, number in granted.items()
         )
+
+    def _fits(
+        self, keeper: str, slab: int, claims: Mapping[str, Claim], expired: Collection[str]
+    ) -> bool:
+        """Whether requests that ``keeper`` has granted, and that wait, meet nobody in ``slab``."""
+        within = frozenset({slab})
+        grants = self._binding(keeper, claims, expired)
+        for uav, number in self.way(keeper, claims).grants.items():
+            way = None if uav not in self._unsaid else self.way(uav, claims)
+            if way is None or way.flies or way.number != number or uav in expired:
+                continue
+            path = self.wanted(uav, way)
+            others = self._taken_by_others(uav, claims, grants, expired)
+            if not all(apart(self.slabs, path, other, within) for other in others):
+                return False
+        return True
+
+    def _taken_by_others(
+        self,
+        uav: str,
+        claims: Mapping[str, Claim],
+        grants: Sequence[Mapping[str, int]],
+        expired: Collection[str],
+    ) -> Iterator[Path]:
+        for other in self._uavs:
+            if other != uav and other not in expired:
+                way = self.way(other, claims)
+                granted = any(each.get(other) == way.number for each in grants)
+                yield self.taken(other, way, granted=granted)
+
+    def _binding(
+        self, keeper: str, claims: Mapping[str, Claim], expired: Collection[str]
+    ) -> list[Mapping[str, int]]:
+        """What ``keeper`` has granted, and what those did on whose seats it sits, or is to sit."""
+        lines = (self._line(seat, claims, expired) for seat in range(len(self._first)))
+        before = {each for *some, now in lines if now == keeper for each in some if each}
+        return [self.way(each, claims).grants for each in (keeper, *sorted(before))]
 
     # -- what a keeper grants ----------------------------------------------------------------
 
@@ -173,11 +255,10 @@ class SharedAir:
         self,
         keeper: str,
         claims: Mapping[str, Claim],
-        before: Mapping[str, int],
         heard: Collection[str],
         expired: Collection[str],
     ) -> dict[str, int]:
-        """By UAV the request that ``keeper`` has granted, those of ``before`` among them.
+        """By UAV the request that ``keeper`` has granted, those of its own claim among them.
 
         Requests are granted in the order of claims. One that would meet a stronger one waits for
         it, though that waits as well; but not who leaves the place where it is in its way.
@@ -185,67 +266,90 @@ class SharedAir:
         Args:
             keeper: who grants.
             claims: newest known of everyone, its own among them.
-            before: what it has granted so far.
             heard: who is there to make requests.
             expired: who is not in the air any more, whatever it said.
         """
+        own = self.way(keeper, claims)
         grants = {
             uav: number
-            for uav, number in before.items()
+            for uav, number in own.grants.items()
             if uav in self._unsaid and self.way(uav, claims).number <= number
         }
         if any(self.way(uav, claims).number < number for uav, number in grants.items()):
             return grants  # an earlier life has granted what this one has not heard of
-        mine = self.kept(keeper, claims, expired)
+        mine, needed = self._sits_in(keeper, claims, heard, expired)
+        binding = [grants, *self._binding(keeper, claims, expired)]
         waiting: list[Path] = []
         for uav in sorted(self._asking(claims), key=lambda each: strength(each, claims)):
             way = self.way(uav, claims)
             if uav not in heard or uav in expired or grants.get(uav) == way.number:
                 continue
             path = self.wanted(uav, way)
-            asked = self.slabs.asked(path, grounded=way.grounded) & mine
-            if not asked:
+            asked = self.slabs.asked(path, grounded=way.grounded)
+            if not asked & needed:
                 continue
-            others = (
-                self.taken(other, its, granted=grants.get(other) == its.number)
-                for other in self._uavs
-                if other != uav and other not in expired
-                for its in (self.way(other, claims),)
-            )
+            others = self._taken_by_others(uav, claims, binding, expired)
             before_it = (
                 other for other in waiting if way.grounded or not self._lets_by(path, other)
             )
-            if all(apart(self.slabs, path, other, asked) for other in (*before_it, *others)):
+            if all(apart(self.slabs, path, each, asked & mine) for each in (*before_it, *others)):
                 grants[uav] = way.number
             else:
                 waiting.append(path)
         return grants
 
+    def _sits_in(
+        self,
+        keeper: str,
+        claims: Mapping[str, Claim],
+        heard: Collection[str],
+        expired: Collection[str],
+    ) -> tuple[frozenset[int], frozenset[int]]:
+        """Slabs in which ``keeper`` has a seat, and those in which its grant is needed as well.
+
+        On the last seat of a slab it is not as long as all others there are heard.
+        """
+        mine, needed = set(), set()
+        for slab, seats in enumerate(self._seats):
+            sitting = [self._sitting(seat, claims, expired) for seat in seats]
+            if keeper in sitting:
+                mine.add(slab)
+                first = sitting[: _majority(len(seats))]
+                if not all(each in heard and each != keeper for each in first):
+                    needed.add(slab)
+        return frozenset(mine), frozenset(needed)
+
+    def _sitting(
+        self, seat: int, claims: Mapping[str, Claim], expired: Collection[str]
+    ) -> str | None:
+        """Whose grants count for that seat: an heir's once it says that it has taken over."""
+        holder = self.holder(seat, claims, expired)
+        if holder is None or holder == self._first[seat]:
+            return holder
+        return holder if seat in self.way(holder, claims).keeps else None
+
     def _asking(self, claims: Mapping[str, Claim]) -> list[str]:
         return [uav for uav in self._uavs if not self.way(uav, claims).flies]
 
-    def is_granted(
-        self,
-        uav: str,
-        claims: Mapping[str, Claim],
-        own: Mapping[str, int],
-        expired: Collection[str],
-    ) -> bool:
-        """Whether all who keep the air of ``uav``'s request have granted it.
+    def is_granted(self, uav: str, claims: Mapping[str, Claim], expired: Collection[str]) -> bool:
+        """Whether enough of those who keep the air of ``uav``'s request have granted it.
 
         Args:
             uav: who asks.
-            claims: newest known of everyone.
-            own: what ``uav`` itself has granted.
+            claims: newest known of everyone, its own as it is about to be said.
             expired: who is not in the air any more.
         """
         way = self.way(uav, claims)
         path = self.wanted(uav, way)
-        return all(
-            keeper is not None
-            and (own if keeper == uav else self.way(keeper, claims).grants).get(uav) == way.number
-            for keeper in self.keepers(path, claims, expired, grounded=way.grounded)
-        )
+        for slab in self.slabs.asked(path, grounded=way.grounded):
+            seats, grants = self._seats[slab], 0
+            for seat in seats:
+                keeper = self._sitting(seat, claims, expired)
+                granted = keeper is not None and self.way(keeper, claims).grants.get(uav)
+                grants += granted == way.number
+            if grants < _majority(len(seats)):
+                return False
+        return True
 
     def in_the_way(
         self, uav: str, here: Path, claims: Mapping[str, Claim], expired: Collection[str]
@@ -265,6 +369,10 @@ def strength(uav: str, claims: Mapping[str, Claim]) -> tuple[float, str]:
     """Sort key of who asks: who has waited longest goes first."""
     claim = claims.get(uav)
     return (0.0 if claim is None else claim.decided_s), uav
+
+
+def _majority(seats: int) -> int:
+    return seats // 2 + 1
 
 
 def is_home(claim: Claim | None) -> bool:

@@ -19,6 +19,8 @@ Path = npt.NDArray[np.float64]
 """(k, 3) corners of what a UAV flies [m; east, north, up from the mission origin]; one: it
 hovers."""
 
+SEATS = 3
+"""Keepers of a slab where there are more UAVs than slabs; two of them grant."""
 POSITION_ERROR_M = 1.0
 """By which a UAV may be elsewhere, or higher or lower, than it takes itself to be [m]."""
 _ROUNDED_M = 1e-6
@@ -245,3 +247,12 @@ def keeper_rows(n_slab: int, n_uav: int) -> tuple[int, ...]:
     if n_uav >= n_slab:
         return tuple(range(n_slab))
     return tuple(slab * n_uav // n_slab for slab in range(n_slab))
+
+
+def keeper_seats(n_slab: int, n_uav: int) -> tuple[tuple[int, ...], ...]:
+    """By slab, the UAVs that keep it together first: three, or one where each can have its own."""
+    rows = keeper_rows(n_slab, n_uav)
+    if n_uav <= n_slab or n_uav < SEATS:
+        return tuple((row,) for row in rows)
+    apart = n_uav // SEATS
+    return tuple(tuple((row + seat * apart) % n_uav for seat in range(SEATS)) for row in rows)

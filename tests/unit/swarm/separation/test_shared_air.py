@@ -14,7 +14,10 @@ from swarm.separation.slabs import Slabs, apart
 
 SLABS = Slabs(10.0, (30.0, 42.0))
 FLEET = [Starter(f"u{k}", (100.0 * k, 0.0, 30.0)) for k in range(3)]
-AIR = SharedAir(SLABS, FLEET)
+TOGETHER = SharedAir(SLABS, FLEET)
+"""Three on two slabs keep each of them together."""
+ALONE = SharedAir(Slabs(10.0, (30.0, 42.0, 54.0)), FLEET)
+"""Each has a slab of its own."""
 ALL = {"u0", "u1", "u2"}
 
 
@@ -26,26 +29,48 @@ def asks(number: int, *path: tuple[float, float, float]) -> ClaimedWay:
     return ClaimedWay(number, path)
 
 
+def hovers(start: Starter, number: int = 0, **grants: int) -> Claim:
+    return claim(ClaimedWay(number, (start.hovers_enu_m,), flies=True, grants=grants))
+
+
 def home(heir: str | None = None, **grants: int) -> Claim:
     way = ClaimedWay(9, (), grounded=True, grants=grants, heir=heir)
     return claim(way, phase=ClaimPhase.OUT)
 
 
-def test_a_free_way_is_granted_by_the_keeper_of_its_layer_alone() -> None:
+def test_where_each_has_a_slab_its_keeper_grants_alone() -> None:
     claims = {"u2": claim(asks(1, (200.0, 0.0, 30.0), (200.0, 50.0, 30.0)))}
-    assert AIR.keeper(0, claims, ()) == "u0"
-    assert AIR.granted("u0", claims, {}, ALL, ()) == {"u2": 1}
-    assert AIR.granted("u1", claims, {}, ALL, ()) == {}
-    assert not AIR.is_granted("u2", claims, {}, ())
-    told = {**claims, "u0": claim(ClaimedWay(0, ((0.0, 0.0, 30.0),), True, grants={"u2": 1}))}
-    assert AIR.is_granted("u2", told, {}, ())
+    assert ALONE.granted("u0", claims, ALL, ()) == {"u2": 1}
+    assert ALONE.granted("u1", claims, ALL, ()) == {}
+    assert not ALONE.is_granted("u2", claims, ())
+    told = {**claims, "u0": hovers(FLEET[0], u2=1)}
+    assert ALONE.is_granted("u2", told, ())
+
+
+def test_two_of_three_grant_and_the_third_speaks_only_for_one_who_is_not_heard() -> None:
+    claims = {"u2": claim(asks(1, (200.0, 0.0, 30.0), (200.0, 50.0, 30.0)))}
+    assert TOGETHER.granted("u0", claims, ALL, ()) == {"u2": 1}
+    assert TOGETHER.granted("u1", claims, ALL, ()) == {"u2": 1}
+    assert TOGETHER.granted("u2", claims, ALL, ()) == {}
+    assert TOGETHER.granted("u2", claims, {"u1", "u2"}, ()) == {"u2": 1}
+    one = {**claims, "u1": hovers(FLEET[1], u2=1)}
+    assert not TOGETHER.is_granted("u2", one, ())
+    lost = {**one, "u2": claim(replace(one["u2"].way or asks(1), grants={"u2": 1}))}
+    assert TOGETHER.is_granted("u2", lost, ())
+
+
+def test_a_way_can_be_asked_for_while_most_of_its_keepers_are_there() -> None:
+    path = np.array([(200.0, 0.0, 30.0), (200.0, 50.0, 30.0)])
+    assert TOGETHER.can_grant(path, {}, (), {"u1", "u2"}.__contains__)
+    assert not TOGETHER.can_grant(path, {}, (), {"u2"}.__contains__)
+    assert not ALONE.can_grant(path, {}, (), {"u1", "u2"}.__contains__)
 
 
 def test_a_way_over_somebody_who_hovers_waits_until_that_one_has_left() -> None:
     claims = {"u2": claim(asks(1, (200.0, 0.0, 30.0), (50.0, 0.0, 30.0)))}
-    assert AIR.granted("u0", claims, {}, ALL, ()) == {}  # u1 hovers at its start on the way
+    assert ALONE.granted("u0", claims, ALL, ()) == {}  # u1 hovers at its start on the way
     claims["u1"] = claim(ClaimedWay(1, ((100.0, 50.0, 30.0),), flies=True))
-    assert AIR.granted("u0", claims, {}, ALL, ()) == {"u2": 1}
+    assert ALONE.granted("u0", claims, ALL, ()) == {"u2": 1}
 
 
 def test_of_two_ways_that_meet_the_one_of_who_waits_longer_is_granted() -> None:
@@ -53,17 +78,18 @@ def test_of_two_ways_that_meet_the_one_of_who_waits_longer_is_granted() -> None:
         "u1": claim(asks(1, (100.0, 0.0, 30.0), (200.0, 100.0, 30.0)), decided_s=5.0),
         "u2": claim(asks(1, (200.0, 0.0, 30.0), (100.0, 100.0, 30.0)), decided_s=3.0),
     }
-    assert AIR.granted("u0", claims, {}, ALL, ()) == {"u2": 1}
+    assert ALONE.granted("u0", claims, ALL, ()) == {"u2": 1}
 
 
 def test_what_is_granted_stays_taken_until_its_uav_asks_for_something_else() -> None:
     crossing = asks(1, (100.0, 0.0, 30.0), (200.0, 100.0, 30.0))
     claims = {"u1": claim(crossing, 5.0), "u2": claim(asks(1, (200.0, 0.0, 30.0)), 9.0)}
-    before = AIR.granted("u0", claims, {}, ALL, ())
+    before = ALONE.granted("u0", claims, ALL, ())
+    claims["u0"] = hovers(FLEET[0], **before)
     claims["u2"] = claim(asks(2, (200.0, 0.0, 30.0), (100.0, 100.0, 30.0)), 3.0)
-    assert AIR.granted("u0", claims, before, ALL, ()) == {"u1": 1}
+    assert ALONE.granted("u0", claims, ALL, ()) == {"u1": 1}
     claims["u1"] = claim(ClaimedWay(2, ((100.0, 0.0, 30.0),), flies=True))
-    assert AIR.granted("u0", claims, before, ALL, ()) == {"u2": 2}
+    assert ALONE.granted("u0", claims, ALL, ()) == {"u2": 2}
 
 
 def test_who_leaves_where_it_is_in_the_way_of_a_stronger_one_need_not_wait_for_it() -> None:
@@ -71,66 +97,176 @@ def test_who_leaves_where_it_is_in_the_way_of_a_stronger_one_need_not_wait_for_i
         "u1": claim(asks(1, (100.0, 0.0, 30.0), (100.0, -50.0, 30.0)), decided_s=5.0),
         "u2": claim(asks(1, (200.0, 0.0, 30.0), (50.0, 0.0, 30.0)), decided_s=1.0),
     }
-    assert AIR.granted("u0", claims, {}, ALL, ()) == {"u1": 1}
+    assert ALONE.granted("u0", claims, ALL, ()) == {"u1": 1}
 
 
 def test_a_keeper_that_knows_less_than_it_granted_grants_nothing() -> None:
-    claims = {"u2": claim(asks(1, (200.0, 0.0, 30.0), (200.0, 50.0, 30.0)))}
-    assert AIR.granted("u0", claims, {"u1": 4}, ALL, ()) == {"u1": 4}
+    claims = {
+        "u0": hovers(FLEET[0], u1=4),
+        "u2": claim(asks(1, (200.0, 0.0, 30.0), (200.0, 50.0, 30.0))),
+    }
+    assert ALONE.granted("u0", claims, ALL, ()) == {"u1": 4}
 
 
-def test_the_air_of_who_is_home_falls_to_its_heir_once_that_knows_what_was_granted() -> None:
+def test_the_seat_of_who_is_home_falls_to_its_heir_once_that_knows_what_was_granted() -> None:
     claims = {"u0": home(heir="u2", u1=4)}
-    assert AIR.keeper(0, claims, ()) == "u2"
-    assert AIR.kept("u2", claims, ()) == frozenset()
+    assert ALONE.holder(0, claims, ()) == "u2"
+    assert ALONE.inherited("u2", claims, ALL, ()) == ()
     claims["u1"] = claim(asks(4, (100.0, 0.0, 30.0)))
-    assert AIR.kept("u2", claims, ()) == {0}
+    assert ALONE.inherited("u2", claims, ALL, ()) == (0,)
 
 
-def test_without_an_heir_it_falls_to_the_next_one() -> None:
-    assert AIR.keeper(0, {"u0": home()}, ()) == "u1"
-    assert AIR.keeper(0, {}, {"u0", "u1"}) == "u2"
-    assert AIR.keeper(0, {}, ALL) is None
+def test_an_heir_grants_nothing_before_it_says_that_it_has_taken_over() -> None:
+    claims = {
+        "u0": home(heir="u2"),
+        "u1": claim(asks(1, (100.0, 0.0, 30.0), (100.0, 50.0, 30.0))),
+        "u2": hovers(FLEET[2]),
+    }
+    assert ALONE.granted("u2", claims, ALL, ()) == {}
+    way = claims["u2"].way
+    assert way is not None
+    claims["u2"] = claim(replace(way, keeps=(0,)))
+    assert ALONE.granted("u2", claims, ALL, ()) == {"u1": 1}
+    claims["u2"] = claim(replace(way, grants={"u1": 1}))
+    assert not ALONE.is_granted("u1", claims, ())
+    claims["u2"] = claim(replace(way, grants={"u1": 1}, keeps=(0,)))
+    assert ALONE.is_granted("u1", claims, ())
+
+
+def test_what_an_heir_has_granted_for_another_slab_has_to_fit_into_the_new_one() -> None:
+    """u1 granted u2 the middle slab of a way that meets, in the lowest, what u0 had granted."""
+    up = asks(1, (200.0, 0.0, 30.0), (100.0, 0.0, 30.0), (100.0, 0.0, 42.0))
+    claims = {
+        "u0": home(heir="u1"),
+        "u1": claim(ClaimedWay(3, ((140.0, 3.0, 30.0),), flies=True, grants={"u2": 1})),
+        "u2": claim(up),
+    }
+    assert ALONE.inherited("u1", claims, ALL, ()) == ()
+    claims["u2"] = claim(replace(up, number=2))
+    assert ALONE.inherited("u1", claims, ALL, ()) == (0,)
+
+
+def test_what_those_before_have_granted_binds_the_heir_too() -> None:
+    claims = {
+        "u0": home(heir="u1", u2=1),
+        "u1": claim(ClaimedWay(3, ((0.0, 90.0, 30.0),), flies=True, keeps=(0,)), 5.0),
+        "u2": claim(asks(1, (200.0, 0.0, 30.0), (0.0, 0.0, 30.0)), 9.0),
+    }
+    crossing = ClaimedWay(4, ((0.0, 90.0, 30.0), (100.0, -50.0, 30.0)), keeps=(0,))
+    claims["u1"] = claim(crossing, 1.0)
+    assert ALONE.granted("u1", claims, ALL, ()) == {}
+
+
+def test_the_seat_of_who_is_gone_is_taken_over_only_when_all_others_are_heard() -> None:
+    assert ALONE.holder(0, {"u0": home()}, ()) == "u1"
+    assert ALONE.holder(0, {}, {"u0", "u1"}) == "u2"
+    assert ALONE.holder(0, {}, ALL) is None
+    assert ALONE.inherited("u1", {}, {"u1"}, {"u0"}) == ()
+    assert ALONE.inherited("u1", {}, {"u1", "u2"}, {"u0"}) == (0,)
+
+
+def test_who_was_only_taken_for_gone_does_not_sit_beside_its_heir() -> None:
+    """It hears who has taken over, and grants nothing there any more."""
+    claims = {
+        "u1": claim(ClaimedWay(0, (FLEET[1].hovers_enu_m,), flies=True, keeps=(0,))),
+        "u2": claim(asks(1, (200.0, 0.0, 30.0), (200.0, 50.0, 30.0))),
+    }
+    assert ALONE.holder(0, claims, ()) == "u1"
+    assert ALONE.granted("u0", claims, ALL, ()) == {}
+    assert ALONE.granted("u1", claims, ALL, ()) == {"u2": 1}
 
 
 def test_who_stands_on_the_ground_takes_no_air_until_its_way_up_is_granted() -> None:
     up = ClaimedWay(1, ((0.0, 0.0, 30.0), (0.0, 50.0, 30.0)), grounded=True)
-    assert len(AIR.taken("u0", up, granted=False)) == 0
-    assert len(AIR.taken("u0", up, granted=True)) == 2
+    assert len(ALONE.taken("u0", up, granted=False)) == 0
+    assert len(ALONE.taken("u0", up, granted=True)) == 2
 
 
-@settings(max_examples=60)
+class Sky:
+    """A fleet whose words arrive late or never, each with its own view of the others."""
+
+    def __init__(self, rng: np.random.Generator) -> None:
+        n_uav, n_slab = int(rng.integers(2, 7)), int(rng.integers(1, 5))
+        self.slabs = Slabs(10.0, tuple(30.0 + 12.0 * k for k in range(n_slab)))
+        fleet = [
+            Starter(f"u{k}", (40.0 * k, 0.0, self.slabs.layers_m[k % n_slab])) for k in range(n_uav)
+        ]
+        self.air, self.names = SharedAir(self.slabs, fleet), [each.uav for each in fleet]
+        self.truth = {each.uav: hovers(each) for each in fleet}
+        self.known = {name: dict(self.truth) for name in self.names}
+        self.lost: set[str] = set()
+        """Who has crashed, and is in nobody's way any more."""
+        self.expired: dict[str, set[str]] = {name: set() for name in self.names}
+        self.rng = rng
+
+    def view(self, name: str) -> tuple[dict[str, Claim], set[str], set[str]]:
+        """What ``name`` knows, whom it hears, and whom it takes for gone."""
+        heard = {each for each in self.names if self.rng.random() < 0.8}
+        return (
+            {**self.known[name], name: self.truth[name]},
+            (heard | {name}) - self.lost,
+            self.expired[name],
+        )
+
+    def say(self, name: str, way: ClaimedWay, phase: ClaimPhase = ClaimPhase.IDLE) -> None:
+        self.truth[name] = claim(way, float(self.rng.integers(100)), phase)
+
+    def act(self) -> None:
+        rng, name = self.rng, str(self.rng.choice(self.names))
+        way = self.truth[name].way
+        assert way is not None
+        if name in self.lost or self.truth[name].phase is ClaimPhase.OUT:
+            return
+        claims, heard, expired = self.view(name)
+        match int(rng.integers(9)):
+            case 0 | 1 if way.flies:  # it has arrived, and asks for somewhere else
+                self.ask(name, way)
+            case 2 | 3:
+                way = replace(way, keeps=self.air.inherited(name, claims, heard, expired))
+                claims[name] = claim(way, self.truth[name].decided_s)
+                grants = self.air.granted(name, claims, heard, expired)
+                self.truth[name] = claim(replace(way, grants=grants), claims[name].decided_s)
+            case 4 if self.air.is_granted(name, claims, expired):
+                self.truth[name] = claim(replace(way, flies=True), claims[name].decided_s)
+            case 5 if rng.random() < 0.1 and way.flies:  # home for good, with an heir or without
+                heir = str(rng.choice(self.names)) if rng.random() < 0.7 else None
+                ended = replace(way, path_enu_m=(), flies=False, grounded=True, heir=heir)
+                self.say(name, ended, ClaimPhase.OUT)
+            case 6 if rng.random() < 0.05:
+                self.lost.add(name)
+            case 7 if self.lost:
+                expired.add(str(rng.choice(sorted(self.lost))))
+            case _:  # it hears of somebody
+                other = str(rng.choice(self.names))
+                self.known[name][other] = self.truth[other]
+
+    def ask(self, name: str, way: ClaimedWay) -> None:
+        """Straight up or down first, or at once, and level, or to another height."""
+        rng, (east_m, north_m, _) = self.rng, way.path_enu_m[-1]
+        corners = [way.path_enu_m[-1]]
+        if rng.random() < 0.5:
+            corners.append((east_m, north_m, float(rng.choice(self.slabs.layers_m))))
+        there = rng.uniform(0.0, 120.0, 2).tolist()
+        corners.append((*there, float(rng.choice(self.slabs.layers_m))))
+        asked = replace(way, number=way.number + 1, path_enu_m=tuple(corners), flies=False)
+        self.say(name, asked)
+
+    def check(self) -> None:
+        flown = []
+        for uav, its in self.truth.items():
+            assert its.way is not None
+            path = np.array(its.way.path_enu_m).reshape(-1, 3)
+            if uav not in self.lost and len(path):
+                flown.append(path if its.way.flies else path[:1])
+        for k, one in enumerate(flown):
+            assert all(apart(self.slabs, one, other) for other in flown[k + 1 :])
+
+
+@settings(max_examples=150)
 @given(seed=st.integers(0, 2**32 - 1))
 def test_ways_that_are_flown_never_meet_whatever_each_keeper_has_heard(seed: int) -> None:
-    """Words arrive late or never; nobody flies but by grants, and all that fly stay apart."""
-    rng = np.random.default_rng(seed)
-    names = [each.uav for each in FLEET]
-    truth = {each.uav: claim(ClaimedWay(0, (each.hovers_enu_m,), flies=True)) for each in FLEET}
-    known = {name: dict(truth) for name in names}
-    for _ in range(60):
-        name = str(rng.choice(names))
-        mine, way = known[name], truth[name].way
-        assert way is not None
-        act = rng.integers(4)
-        if act == 0 and way.flies:  # it has arrived, and asks for somewhere else
-            there = (*rng.uniform(0.0, 200.0, 2).tolist(), float(rng.choice(SLABS.layers_m)))
-            way = replace(way, number=way.number + 1, path_enu_m=(way.path_enu_m[-1], there))
-            truth[name] = claim(replace(way, flies=False), float(rng.integers(100)))
-        elif act == 1:
-            granted = AIR.granted(name, {**mine, name: truth[name]}, way.grants, ALL, ())
-            truth[name] = replace(truth[name], way=replace(way, grants=granted))
-        elif act == 2 and AIR.is_granted(name, {**mine, name: truth[name]}, way.grants, ()):
-            truth[name] = replace(truth[name], way=replace(way, flies=True))
-        else:  # it hears of somebody
-            other = str(rng.choice(names))
-            mine[other] = truth[other]
-        flown = [
-            AIR.wanted(uav, its.way) for uav, its in truth.items() if its.way and its.way.flies
-        ]
-        flown += [
-            AIR.wanted(uav, its.way)[:1]
-            for uav, its in truth.items()
-            if its.way and not its.way.flies
-        ]
-        for k, one in enumerate(flown):
-            assert all(apart(SLABS, one, other) for other in flown[k + 1 :])
+    """Nobody flies but by grants: some go home, some crash, and seats change hands."""
+    sky = Sky(np.random.default_rng(seed))
+    for _ in range(150):
+        sky.act()
+        sky.check()
