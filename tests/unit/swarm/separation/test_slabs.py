@@ -99,7 +99,7 @@ def test_who_stays_where_it_hovers_asks_nobody() -> None:
 
 def test_who_hovers_keeps_the_whole_height_of_its_slab() -> None:
     hover = np.array([[0.0, 0.0, 42.0]])
-    below = np.array([[11.0, -50.0, 36.5], [11.0, 50.0, 36.5]])  # farther than 12 m from it in space
+    below = np.array([[11.0, -50.0, 36.5], [11.0, 50.0, 36.5]])  # beyond 12 m
     assert math.dist((0.0, 0.0, 42.0), (11.0, 0.0, 36.5)) > 12.0
     assert not apart(SLABS, hover, below)
 
