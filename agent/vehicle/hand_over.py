@@ -103,6 +103,7 @@ def hand_over(
     if session.mission is not None:
         session.mission.abort(reason)
     session.abort_fence()
+    session.pace_m_s = None  # whatever it was told, nothing is put back any more
     session.report(HandedOver(reason, silent=loss is not None))
     return HandOver(session, explanation, loss)
 

@@ -116,7 +116,9 @@ def gives_way(activity: Activity) -> bool:
 
 
 def set_pace(session: VehicleSession, speed_m_s: float | None) -> None:
-    """Fly what is flown no faster than that; None: at cruise speed again."""
+    """Fly what is flown no faster than that; None, or no speed at all: at cruise speed again."""
+    if speed_m_s is not None and not 0.0 < speed_m_s < session.cruise_speed_m_s:
+        speed_m_s = None
     if speed_m_s == session.pace_m_s or session.firmware is None:
         return
     session.pace_m_s = speed_m_s

@@ -15,7 +15,17 @@ from random import Random
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from agent.core.interface import GoTo, Hold, KeepOut, Prepare, Ready, Return, Swap, VehicleOrder
+from agent.core.interface import (
+    GiveWay,
+    GoTo,
+    Hold,
+    KeepOut,
+    Prepare,
+    Ready,
+    Return,
+    Swap,
+    VehicleOrder,
+)
 from agent.vehicle.activity import FlightPhase
 from agent.vehicle.bridge import Bridge
 from agent.vehicle.config import BridgeConfig, CommandStyle
@@ -43,6 +53,7 @@ _PHASES = (
     FlightPhase.HOVERING,
     FlightPhase.FLYING,
     FlightPhase.HOLDING,
+    FlightPhase.YIELDING,
     FlightPhase.RETURNING,
     FlightPhase.LANDING,
     FlightPhase.STANDING,
@@ -148,6 +159,11 @@ class Episode:
             self._fly(_BRING_UP_STEP_S)
         if phase is FlightPhase.FLYING:
             self._happen(self._go_to(inside=True))
+        elif phase is FlightPhase.YIELDING:
+            if self.random.random() < 0.7:
+                self._happen(self._go_to(inside=True))
+                self._fly(1.0)
+            self._happen(GiveWay(((*START.position_enu_m[:2], 22.0),)))
         elif phase is FlightPhase.RETURNING:
             self._happen(Return("enough"))
         elif phase in (FlightPhase.LANDING, FlightPhase.STANDING):
@@ -223,7 +239,7 @@ class Episode:
 
     def _order(self) -> VehicleOrder:
         random = self.random
-        match random.randrange(13):
+        match random.randrange(15):
             case 0 | 1:
                 speed_m_s = random.choice((4.0, 4.0, 4.0, 0.0, -1.0, math.nan, math.inf))
                 return Prepare(self._place(), speed_m_s, resume=random.random() < 0.5)
@@ -237,6 +253,9 @@ class Episode:
                 return Ready(self._legs + random.choice((0, 0, 0, -1)))
             case 11:
                 return self._zones()
+            case 12 | 13:
+                speed_m_s = random.choice((None, 2.0, 0.0, -1.0, math.nan, math.inf))
+                return GiveWay(self._corners(), random.random() < 0.3, speed_m_s)
             case _:
                 via = self._place() if random.random() < 0.5 else None
                 path = self._corners() if random.random() < 0.5 else ()
