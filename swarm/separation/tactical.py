@@ -190,7 +190,8 @@ class TacticalResolver:
         if not others:
             self._end()
             return self._advice
-        self._blame(others, passed_s, now_s)
+        if own.path_enu_m:
+            self._blame(others, passed_s, now_s)
         option, because_of = self._choose(own, others, now_s)
         barred_by = self._barred_by(own, option, others, wide=self._advice.braked)
         if barred_by is not None:
@@ -214,8 +215,8 @@ class TacticalResolver:
         return _Other(uav, track, expected_m, track.column_m(), stops_m, stray_m, first)
 
     def _blame(self, others: Sequence[_Other], passed_s: float, now_s: float) -> None:
-        """Count who has kept this UAV from flying since the last decision."""
-        if not self._advice.stands:
+        """Count who has kept this UAV from flying its way since the last decision."""
+        if not self._advice.stands and self._advice.maneuver is not Maneuver.ASIDE:
             return
         for other in others:
             if other.uav == self._advice.because_of:

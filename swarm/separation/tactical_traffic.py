@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 from swarm.separation.tactical_motion import (
@@ -66,6 +66,16 @@ class TrafficWord:
     """At which it flies that."""
     precedence: Precedence
 
+    def within(self, fastest_m_s: float) -> TrafficWord:
+        """The same of a UAV that is no faster than that, as far ahead as others look for it."""
+        speed_m_s = math.hypot(*self.velocity_enu_m_s)
+        if max(speed_m_s, self.speed_m_s) <= fastest_m_s:
+            return self
+        share = min(1.0, fastest_m_s / max(speed_m_s, fastest_m_s))
+        east, north, up = (share * each for each in self.velocity_enu_m_s)
+        told_m_s = min(self.speed_m_s, fastest_m_s)
+        return replace(self, velocity_enu_m_s=(east, north, up), speed_m_s=told_m_s)
+
 
 @dataclass(frozen=True, slots=True)
 class TrafficRules:
@@ -118,6 +128,11 @@ class TrafficRules:
         """Nobody farther away matters within the horizon."""
         return 2.0 * self.cruise_m_s * self.horizon_s + self.apart_m
 
+    @property
+    def fastest_m_s(self) -> float:
+        """No UAV of the fleet is faster, whatever it says."""
+        return _FAST * self.cruise_m_s
+
 
 _ROOM_M = 1.0
 _LEAST_ASIDE_M = 2.0
@@ -140,7 +155,13 @@ PATIENCE_S = 60.0
 """Who has kept a UAV from flying for so long, in all, by moving about, is not believed."""
 DISBELIEF_S = 300.0
 _FORGIVEN = 0.2
-"""Share of the time that is taken off what it has cost."""
+"""Share of the time that is taken off what it has cost, once it has cost nothing for a while."""
+_GRUDGE_S = 20.0
+"""That while: who is stopped rather tries another way for some seconds in between."""
+_UPRIGHT_BLAME = 0.5
+"""Share of the time that one costs who climbs or lands: it can't do otherwise, and that ends."""
+_MOST_COLUMN_M = 300.0
+"""Nobody is taken to climb or to land farther than that at once."""
 
 
 class NearbyTrack:
@@ -159,6 +180,7 @@ class NearbyTrack:
         self.cost_s = 0.0
         """For how long it has kept this UAV from flying, less what is forgiven."""
         self._counted_s = now_s
+        self._blamed_s = -math.inf
         self._stood_at_m = word.position_enu_m
         self._moved_s = -math.inf
         """When it was last seen to have moved."""
@@ -168,7 +190,7 @@ class NearbyTrack:
     def hear(self, word: TrafficWord, now_s: float, age_s: float, rules: TrafficRules) -> None:
         """It says so now."""
         passed_s = max(0.0, now_s - age_s - self.said_s) + _LATE_S
-        way_m = _FAST * rules.cruise_m_s * passed_s + 2.0 * rules.position_error_m + _JUMP_ROOM_M
+        way_m = rules.fastest_m_s * passed_s + 2.0 * rules.position_error_m + _JUMP_ROOM_M
         if math.dist(word.position_enu_m, self.word.position_enu_m) > way_m:
             self._implausible_until_s = now_s + _IMPLAUSIBLE_S
         if math.dist(word.position_enu_m, self._stood_at_m) > _STANDS_M:
@@ -180,14 +202,16 @@ class NearbyTrack:
         """It has kept this UAV from flying for so long; who only stands is not blamed."""
         if now_s - self._moved_s > _STANDS_S:
             return
-        self.cost_s += seconds
+        self._blamed_s = now_s
+        self.cost_s += seconds if self.column_m() is None else _UPRIGHT_BLAME * seconds
         if self.cost_s >= PATIENCE_S:
             self.cost_s = 0.0
             self._disbelieved_until_s = now_s + DISBELIEF_S
 
     def forgive(self, now_s: float) -> None:
         """Time passes."""
-        self.cost_s = max(0.0, self.cost_s - _FORGIVEN * (now_s - self._counted_s))
+        since_s = max(self._counted_s, self._blamed_s + _GRUDGE_S)
+        self.cost_s = max(0.0, self.cost_s - _FORGIVEN * max(0.0, now_s - since_s))
         self._counted_s = now_s
 
     def is_plausible(self, now_s: float) -> bool:
@@ -222,7 +246,10 @@ class NearbyTrack:
         if word.precedence.grade is not Grade.BOUND or not word.path_enu_m:
             return None
         here, end = word.position_enu_m, word.path_enu_m[-1]
-        return None if math.dist(here[:2], end[:2]) > _STANDS_M else column_m(here, end[2])
+        if math.dist(here[:2], end[:2]) > _STANDS_M:
+            return None
+        low_m, high_m = here[2] - _MOST_COLUMN_M, here[2] + _MOST_COLUMN_M
+        return column_m(here, min(max(end[2], low_m), high_m))
 
     def stops_m(self, now_s: float, rules: TrafficRules) -> tuple[FloatArray, tuple[float, float]]:
         """Where it may be before it has stopped, however it decides until it hears more.
@@ -256,6 +283,8 @@ class TrafficPicture:
         self._rules = rules
         self._heard_m = heard_m
         self._tracks: dict[str, NearbyTrack] = {}
+        self._gone: dict[str, NearbyTrack] = {}
+        """Who has landed or left: what it has cost still counts when it is back."""
 
     def hear(self, uav: str, word: TrafficWord, now_s: float, age_s: float) -> None:
         """Another UAV says so of itself.
@@ -266,10 +295,13 @@ class TrafficPicture:
             now_s: now, on the own clock.
             age_s: how old the word is, as far as that is known.
         """
-        track = self._tracks.get(uav)
+        word = word.within(self._rules.fastest_m_s)
+        track = self._tracks.get(uav) or self._gone.get(uav)
         if track is None:
             self._tracks[uav] = NearbyTrack(word, now_s, age_s)
         elif now_s - age_s >= track.said_s:
+            self._tracks[uav] = track
+            self._gone.pop(uav, None)
             track.hear(word, now_s, age_s, self._rules)
 
     @property
@@ -283,8 +315,9 @@ class TrafficPicture:
         return None if track is None else track.word.position_enu_m
 
     def forget(self, uav: str) -> None:
-        """It has landed."""
-        self._tracks.pop(uav, None)
+        """It has landed, or left."""
+        if (track := self._tracks.pop(uav, None)) is not None:
+            self._gone[uav] = track
 
     def near(self, place_m: Place, now_s: float) -> Iterator[tuple[str, NearbyTrack]]:
         """Those who matter to a UAV at that place, in the order of their ids."""
@@ -292,14 +325,14 @@ class TrafficPicture:
             track.forgive(now_s)
             age_s = now_s - track.said_s
             if age_s > FORGET_S:
-                del self._tracks[uav]
+                self.forget(uav)
                 continue
             if not track.is_believed(now_s):
                 continue
             away_m = math.dist(place_m, track.word.position_enu_m)
-            if away_m <= self._rules.reach_m + _FAST * self._rules.cruise_m_s * age_s:
+            if away_m <= self._rules.reach_m + self._rules.fastest_m_s * age_s:
                 if track.is_silent(now_s) and self._has_left(track, place_m, now_s):
-                    del self._tracks[uav]
+                    self.forget(uav)
                     continue
                 yield uav, track
 

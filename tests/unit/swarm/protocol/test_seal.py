@@ -25,6 +25,7 @@ from swarm.protocol.messages import (
     demoted,
 )
 from swarm.protocol.seal import ANSWER, Seal, UnacceptableError, open_envelope
+from swarm.protocol.uav_messages import Nearby
 from tests.support.builders import MISSION, choice, done, entry, epoch, held, message, status
 from tests.support.keyring import Keyring
 
@@ -36,11 +37,24 @@ SEALS = {name: KEYS.seal(name) for name in KEYS.private}
 NONCE = bytes(range(16))
 STATE = KeySpace(MISSION).state("u0")
 
+NEARBY = Nearby(
+    (3, -2),
+    True,
+    (760.0, -310.0, 40.0),
+    (8.0, 0.0, 0.0),
+    ((900.0, -310.0, 40.0),),
+    8.0,
+    1,
+    0,
+    0,
+    1.0,
+)
 HONEST = [
     (CLAIM, "u0"),
     (message("u0", done("t0")), "u0"),
     (message("u0", status()), "u0"),
     (message("u0", choice("t0")), "u0"),
+    (message("u0", NEARBY), "u0"),
     (message(COORDINATOR, epoch("u0")), COORDINATOR),
     (message(COORDINATOR, entry("t0")), "coordinator-2"),
     (message(OPERATOR, OperatorCommand("u0", CommandKind.HOLD, 1, "")), OPERATOR),
@@ -192,6 +206,14 @@ def test_an_honest_envelope_on_anothers_key_is_dropped() -> None:
     key = KeySpace(MISSION).claim("u1")
 
     assert drop_reason(key, envelope(CLAIM, "u0")) == "said on another's key"
+
+
+def test_where_somebody_is_counts_in_the_cell_for_which_it_was_said_alone() -> None:
+    """Or its old words could be told to those who fly elsewhere by now."""
+    said = message("u0", NEARBY)
+    elsewhere = KeySpace(MISSION).near("u0", 0, 0)
+
+    assert drop_reason(elsewhere, envelope(said, "u0")) == "said on another's key"
 
 
 def test_what_is_wrongly_signed_is_not_even_parsed() -> None:

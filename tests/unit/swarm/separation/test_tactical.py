@@ -17,6 +17,7 @@ from swarm.separation.tactical_traffic import (
     FORGET_S,
     PATIENCE_S,
     Grade,
+    NearbyTrack,
     Precedence,
     TrafficPicture,
     TrafficRules,
@@ -174,6 +175,8 @@ def test_who_hears_nothing_for_a_while_keeps_its_distance(length_s: float) -> No
 
 # -- who lies ----------------------------------------------------------------------------
 
+Lie = Callable[[Crowd], Iterator[tuple[str, TrafficWord]]]
+
 
 def jumping(crowd: Crowd) -> Iterator[tuple[str, TrafficWord]]:
     """It says that it is somewhere else each time, right before one of the others."""
@@ -183,7 +186,7 @@ def jumping(crowd: Crowd) -> Iterator[tuple[str, TrafficWord]]:
             yield "liar", TrafficWord(tuple(place), (0.0, 0.0, 0.0), (), 8.0, FIRST)
 
 
-def staying_before(uav: str) -> Callable[[Crowd], Iterator[tuple[str, TrafficWord]]]:
+def staying_before(uav: str) -> Lie:
     """It says that it flies along right before one of the others, wherever that turns to."""
 
     def lie(crowd: Crowd) -> Iterator[tuple[str, TrafficWord]]:
@@ -197,13 +200,71 @@ def staying_before(uav: str) -> Callable[[Crowd], Iterator[tuple[str, TrafficWor
     return lie
 
 
-@pytest.mark.parametrize("lie", [jumping, staying_before("a")], ids=["jumping", "staying before"])
-def test_a_liar_neither_makes_others_collide_nor_stops_them_for_good(
-    lie: Callable[[Crowd], Iterator[tuple[str, TrafficWord]]],
-) -> None:
-    crowd = Crowd(RULES, CONSTRUCTED["crossing"](), liars=[lie])
+def circling(place: Place) -> Lie:
+    """It says that it flies round and round where somebody wants to go."""
 
-    arrived = crowd.fly(40.0 + 3.0 * PATIENCE_S)
+    def lie(crowd: Crowd) -> Iterator[tuple[str, TrafficWord]]:
+        angle = 0.5 * crowd.now_s
+        east, north = place[0] + 8.0 * math.cos(angle), place[1] + 8.0 * math.sin(angle)
+        velocity = (-4.0 * math.sin(angle), 4.0 * math.cos(angle), 0.0)
+        yield "liar", TrafficWord((east, north, place[2]), velocity, (place,), 4.0, FIRST)
+
+    return lie
+
+
+def coming_and_going(lie: Lie) -> Lie:
+    """It lies so, and says now and then that it has landed."""
+
+    def lie_on(crowd: Crowd) -> Iterator[tuple[str, TrafficWord]]:
+        if int(crowd.now_s) % 20 == 0:
+            for picture in crowd.pictures.values():
+                picture.forget("liar")
+        else:
+            yield from lie(crowd)
+
+    return lie_on
+
+
+def up_and_down(place: Place) -> Lie:
+    """It says that it climbs and lands there all the time, which one can't do otherwise."""
+
+    def lie(crowd: Crowd) -> Iterator[tuple[str, TrafficWord]]:
+        phase = crowd.now_s % 80.0
+        up, end = (60.0 - phase, 0.0) if phase < 40.0 else (phase - 20.0, 60.0)
+        velocity = (0.0, 0.0, -1.0 if phase < 40.0 else 1.0)
+        way = (at(place[0], place[1], end),)
+        yield "liar", TrafficWord(at(place[0], place[1], up), velocity, way, 1.0, FIRST)
+
+    return lie
+
+
+def boundless(crowd: Crowd) -> Iterator[tuple[str, TrafficWord]]:
+    """It says that it flies at a million metres a second, as far up and down as can be said."""
+    for number, each in enumerate(crowd.flyers):
+        east, north, up = each.place_m.tolist()
+        sign = 1.0 if number % 2 else -1.0
+        way = (at(east + 12.0, north, sign * 1e6),)
+        yield (
+            f"liar {number}",
+            TrafficWord(at(east + 12.0, north, up), (0.0, 0.0, sign * 1e6), way, 1e6, FIRST),
+        )
+
+
+LIES: dict[str, Lie] = {
+    "jumping": jumping,
+    "staying before": staying_before("a"),
+    "staying before, with landings in between": coming_and_going(staying_before("a")),
+    "circling at the goal": circling(at(200.0, 0.0)),
+    "climbing and landing at the goal": up_and_down(at(200.0, 0.0)),
+    "boundless": boundless,
+}
+
+
+@pytest.mark.parametrize("name", LIES)
+def test_a_liar_neither_makes_others_collide_nor_stops_them_for_good(name: str) -> None:
+    crowd = Crowd(RULES, CONSTRUCTED["crossing"](), liars=[LIES[name]])
+
+    arrived = crowd.fly(40.0 + 5.0 * PATIENCE_S)
 
     assert arrived, crowd.told()
     assert crowd.nearest_m >= RULES.separation_m - 2.0, crowd.told()
@@ -220,6 +281,36 @@ def test_one_that_only_stands_is_never_disbelieved() -> None:
 
     assert advice.stands
     assert advice.because_of == "b"
+
+
+def test_what_no_uav_can_do_costs_others_no_more_to_look_at_than_what_one_can() -> None:
+    """Or a single word would keep all who hear it busy for minutes."""
+    track = NearbyTrack(
+        TrafficWord(at(0, 0), (0.0, 0.0, -1e6), (at(0, 0, -1e6),), 1e6, FIRST).within(
+            RULES.fastest_m_s
+        ),
+        0.0,
+        0.0,
+    )
+    stops_m, _ = track.stops_m(0.0, RULES)
+    column = track.column_m()
+
+    assert len(stops_m) < 60
+    assert column is not None
+    assert len(column) < 310
+    assert track.word.speed_m_s == RULES.fastest_m_s
+    assert math.hypot(*track.word.velocity_enu_m_s) == pytest.approx(RULES.fastest_m_s)
+
+
+def test_one_that_lands_is_waited_for_longer_than_one_that_moves_about() -> None:
+    """It costs half: a landing from a hundred metres takes longer than patience lasts."""
+    lands = NearbyTrack(TrafficWord(at(0, 0), (0, 0, -1.0), (at(0, 0, 0),), 1.0, FIRST), 0.0, 0.0)
+    word = TrafficWord(at(0, 9), (0, 0, -1.0), (at(0, 9, 0),), 1.0, FIRST)
+    lands.hear(word, 1.0, 0.0, RULES)
+    lands.blame(2.0, 1.5 * PATIENCE_S)
+    assert lands.is_believed(3.0)
+    lands.blame(3.0, 0.6 * PATIENCE_S)
+    assert not lands.is_believed(4.0)
 
 
 def no_way_round(_path: Sequence[Place]) -> bool:
