@@ -30,6 +30,7 @@ from agent.core.interface import (
     Telemetry,
     VehicleOrder,
 )
+from agent.core.room_aside import RoomAside
 from agent.core.states import AgentState
 from agent.core.take_off_turn import TakeOffTurn, who_is_in
 from swarm.protocol.board import ranks
@@ -83,6 +84,7 @@ class NearTraffic(AgentPart):
         super().__init__(context)
         self._is_flown = is_flown
         self._turn = TakeOffTurn(context)
+        self._room = RoomAside(context.replica)
         self.when_disturbed: Callable[[], None] = lambda: None
         """Is told when the vehicle no longer flies as it was ordered."""
         self._brief: MissionConfig | None = None
@@ -250,9 +252,10 @@ class NearTraffic(AgentPart):
             if rules != self._rules:
                 self._rules = rules
                 self._cell_m = 1.0 if rules is None else cell_m(rules)
-                self._resolver = None if rules is None else TacticalResolver(self._uav, rules)
-                heard_m = 0.9 * self._cell_m
-                self._picture = None if rules is None else TrafficPicture(rules, heard_m)
+                self._resolver = self._picture = None
+                if rules is not None:
+                    self._resolver = TacticalResolver(self._uav, rules, self._room.is_clear)
+                    self._picture = TrafficPicture(rules, 0.9 * self._cell_m)
         return self._rules is not None and self._mission_view.me is not None
 
     # -- its own flight -----------------------------------------------------------------
