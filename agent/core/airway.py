@@ -327,7 +327,7 @@ class Airway:
                 self._wish = None
                 self._way = self._hover()
                 self._actions.append(LogLine("no way", {"task": task}))
-                return [Refused(wish.order, "no way there becomes free")]
+                return [Refused(wish.order, "no way there becomes free", passes=True)]
             end_s = self.sortie_end_s()
             if task is None and self._aloft and self._fleet.must_go(wish, end_s, self._retry_s):
                 self._actions.append(LogLine("flies where it may meet others", {}))

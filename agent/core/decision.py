@@ -177,6 +177,10 @@ def _stronger_claims(
     }
 
 
+_PASSING_FRAC = 1.0 / 6.0
+"""Of the pause, after which a task is considered again that others were in the way of."""
+
+
 class RefusedTasks:
     """Tasks that a UAV's vehicle would not fly to, each left alone for a while."""
 
@@ -185,11 +189,12 @@ class RefusedTasks:
         self._refusals: dict[str, tuple[int, float]] = {}
         """How often, and until when."""
 
-    def add(self, task: str, now_s: float) -> None:
-        """The vehicle has refused ``task``."""
+    def add(self, task: str, now_s: float, *, passes: bool = False) -> None:
+        """The vehicle has refused ``task``; or it is another UAV that was in the way (``passes``)."""
         times = 1 + self._refusals.get(task, (0, 0.0))[0]
+        pause_s = _PASSING_FRAC * self._pause_s if passes else self._pause_s
         # Each time for longer, so that a fleet may find that nobody takes what is left.
-        self._refusals[task] = times, now_s + self._pause_s * 2.0 ** (times - 1)
+        self._refusals[task] = times, now_s + pause_s * 2.0 ** (times - 1)
 
     def left_alone(self, now_s: float) -> dict[str, float]:
         """Task -> until when it is left alone [s]."""

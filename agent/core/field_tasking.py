@@ -125,7 +125,7 @@ class FieldTasking(Tasking):
         """The vehicle has a full battery."""
         self._visits.swapped(leg, now_s)
 
-    def refuse(self, leg: int, reason: str, now_s: float) -> None:
+    def refuse(self, leg: int, reason: str, now_s: float, *, passes: bool = False) -> None:
         """The vehicle will not fly that leg, or not land: leave its aim alone for a while."""
         if leg != self._flights.leg:
             return
@@ -136,13 +136,13 @@ class FieldTasking(Tasking):
             self._refused_bases.add(claim.base, now_s)
         if base is not None:
             if claim is not None and claim.task is not None:
-                self._refused.add(claim.task, now_s)
+                self._refused.add(claim.task, now_s, passes=passes)
             self._become_free(self._mission_view.mission_s(now_s))
             self._visits.stay(base, now_s)
         elif visits:
             self._visits.break_off(f"vehicle refused: {reason}", now_s)
         else:
-            super().refuse(leg, reason, now_s)
+            super().refuse(leg, reason, now_s, passes=passes)
 
     def leaves_refused(self, now_s: float) -> bool:
         """Whether, being idle, it leaves a task or base alone that its vehicle has refused."""

@@ -242,6 +242,8 @@ class Refused:
     reason: str
     stands: bool = field(default=False, compare=False)
     """The vehicle that was to be prepared stands on the ground, its motors too."""
+    passes: bool = field(default=False, compare=False)
+    """What is in the way is another UAV, which goes on."""
 
 
 @dataclass(frozen=True, slots=True)

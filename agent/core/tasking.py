@@ -176,12 +176,15 @@ class Tasking(AgentPart, ABC):
         """The attempt at the task of that leg fails; its service takes its time all the same."""
         self._attempt.fails |= leg == self._flights.leg and self._task() is not None
 
-    def refuse(self, leg: int, reason: str, now_s: float) -> None:
-        """The vehicle will not fly that leg: leave its task alone for a while."""
+    def refuse(self, leg: int, reason: str, now_s: float, *, passes: bool = False) -> None:
+        """The vehicle will not fly that leg: leave its task alone for a while.
+
+        A short one where another UAV is in the way and goes on (``passes``).
+        """
         task = self._task()
         current = leg == self._flights.leg and task is not None
         if current and task is not None and self._machine.allows(Trigger.CLAIM_LOST):
-            self._refused.add(task.task, now_s)
+            self._refused.add(task.task, now_s, passes=passes)
             self._release(f"vehicle refused: {reason}", now_s)
 
     def advance(self, now_s: float, *, informed: bool) -> None:

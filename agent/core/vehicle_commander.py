@@ -30,7 +30,6 @@ from agent.core.interface import (
     Swap,
     Swapped,
     Telemetry,
-    VehicleOrder,
     VehicleReady,
     VehicleReport,
 )
@@ -105,8 +104,8 @@ class VehicleCommander(AgentPart):
                 self._tasking.measure(now_s)
             case Refused(Prepare(), reason, stands=True) if self._stand_there(reason, now_s):
                 pass
-            case Refused(order, reason):
-                self._give_up_order(order, reason, now_s)
+            case Refused() as refused:
+                self._give_up_order(refused, now_s)
             case HandedOver(reason, silent):
                 self.give_up(reason, now_s, handed_over=not silent)
             case HandOverExplained(reason):
@@ -145,11 +144,12 @@ class VehicleCommander(AgentPart):
             self._log("found on the ground at a base", reason=reason)
         return stands
 
-    def _give_up_order(self, order: VehicleOrder, reason: str, now_s: float) -> None:
+    def _give_up_order(self, refused: Refused, now_s: float) -> None:
+        order, reason = refused.order, refused.reason
         label = self._tasking.label(order.leg) if isinstance(order, GoTo) else {}
         self._log("vehicle refused", order=str(order), reason=reason, **label)
         if isinstance(order, GoTo | Swap):
-            self._tasking.refuse(order.leg, reason, now_s)
+            self._tasking.refuse(order.leg, reason, now_s, passes=refused.passes)
         elif isinstance(order, Return) and (order.path_enu_m or order.land):
             # Better home by the vehicle's own way than nowhere.
             self._order(Return(order.reason, order.resume))
