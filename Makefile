@@ -10,7 +10,7 @@ unexport PYTHONDONTWRITEBYTECODE
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
 .PHONY: demo test test-all test-computed test-processes browser lint audit format kernels sanitize soak chaos fuzz clean help
-.PHONY: dist check-dist sbom wheels check-units
+.PHONY: dist check-dist sbom wheels check-units check-machines
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
@@ -29,6 +29,7 @@ help:
 	@echo "make sbom    bill of materials of that wheel, into dist/"
 	@echo "make wheels  wheels for all machines, into dist/wheels/; needs Docker or Podman"
 	@echo "make check-units  boot systemd in a container, and kill and freeze the services of a fleet (root)"
+	@echo "make check-machines  fly a fleet on two network namespaces, and pull the cable between them (root)"
 	@echo "make clean   remove what was built and installed here"
 
 demo: $(VENV)/.installed
@@ -156,6 +157,9 @@ fuzz: $(VENV)/.installed-dev
 # A real systemd in a container; as root on a machine with debootstrap and systemd-nspawn.
 check-units: $(VENV)/.installed-dev
 	deploy/checks/units.sh
+
+check-machines: $(VENV)/.installed-dev
+	deploy/checks/machines.sh
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

@@ -176,9 +176,9 @@ class AgentCore(AgentPart):
             self._mission_view.move(event)
             if not self._tasking.measure(now_s):
                 return []
-        if isinstance(event, MessageReceived | MessagesReceived) and self._is_idle(now_s):
+        if isinstance(event, MessageReceived | MessagesReceived):
             event = self._sync.without_repeated(event, now_s)
-            if not event.messages:
+            if not event.messages and self._is_idle(now_s):
                 return []
         if not self._machine.has_ended:
             if self._stall_detector.late(now_s):

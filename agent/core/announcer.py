@@ -34,7 +34,7 @@ class Announcer:
         self._claim_key = KeySpace(register_writer.mission).claim(register_writer.writer)
         self._note = self._caution = ""
         self._turn = 0
-        self._claims_turn = False
+        self._is_claims_turn = True
         self._stretch = 1.0
         self._news: set[str] = set()
         """Keys of own registers whose content has been said once only."""
@@ -119,9 +119,9 @@ class Announcer:
         """
         own = list(self._replica.messages({self._register_writer.writer}))
         if self._stretch > 1.0:
-            self._claims_turn = not self._claims_turn
-            always = self._news | ({self._claim_key} if self._claims_turn else set())
-            at_once = 0 if self._claims_turn else 1
+            always = self._news | ({self._claim_key} if self._is_claims_turn else set())
+            at_once = 0 if self._is_claims_turn else 1
+            self._is_claims_turn = not self._is_claims_turn
         else:
             always = {m.key for m in own if isinstance(m.body, Claim | Calibration)}
             at_once = _OUTCOMES_AT_ONCE
@@ -148,8 +148,10 @@ class Announcer:
         """Somebody is there anew: repeat the own registers, once for all who come together."""
         if now_s >= self._free_at_s:
             self._free_at_s = now_s + self._stretch * self._timing.ask_gap_s
+            self._is_claims_turn = True
             return self.announce(now_s)
         self._announce_at_s = earliest(self._announce_at_s, self._free_at_s)
+        self._is_claims_turn = True
         return []
 
     def repeat(self, status: Callable[[], Status], now_s: float, *, learned: bool) -> list[Publish]:

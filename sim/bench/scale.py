@@ -33,7 +33,7 @@ from swarm.protocol.encoding import NAMES
 from swarm.protocol.events import CommonAction, CommonEvent, MessageReceived
 from swarm.protocol.messages import MissionPhase
 from swarm.protocol.timing import LinkKind
-from swarm.protocol.uav_messages import Choice, Status
+from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.log import LogFormat
 from swarm.runtime.shell import Core
@@ -110,6 +110,21 @@ class ScaleRun:
         """All that an agent hears but answers."""
         return sum(self.received_hz.values())
 
+    @property
+    def claims_per_decision(self) -> float | None:
+        """Claims that UAVs published for each of their decisions, repetitions included.
+
+        None: nobody decided while it was watched.
+        """
+        decisions_hz = self.published_hz.get(NAMES[Choice], 0.0)
+        return self.published_hz.get(NAMES[Claim], 0.0) / decisions_hz if decisions_hz else None
+
+    @property
+    def besides_hz(self) -> float:
+        """What an agent hears but claims and outcomes, which follow decisions."""
+        of_decisions = (NAMES[Claim], NAMES[Outcome])
+        return sum(hz for kind, hz in self.received_hz.items() if kind not in of_decisions)
+
     def latency_quantile_ms(self, share: float) -> float | None:
         """The smallest time that is not exceeded in that share of all decisions."""
         return quantile(self.latency_ms, share)
@@ -117,6 +132,7 @@ class ScaleRun:
     def as_json(self) -> dict[str, Any]:
         """Everything, with what follows from it."""
         derived = ("agent_cpu_frac", "agent_share_mean_bytes", "said_hz", "heard_hz")
+        derived += ("besides_hz", "claims_per_decision")
         return {
             **asdict(self),
             **{name: getattr(self, name) for name in derived},
@@ -154,6 +170,8 @@ class ScaleBench(BenchResult):
                 Column("p50", ".1f", "ms"),
                 Column("p99", ".1f", "ms"),
                 Column("decisions"),
+                Column("claims each", ".1f", none="-"),
+                Column("heard besides", ".1f", "/s"),
                 Column("lost"),
                 Column("load", ".1f"),
             ),
@@ -169,6 +187,8 @@ class ScaleBench(BenchResult):
                     run.latency_quantile_ms(0.5),
                     run.latency_quantile_ms(0.99),
                     len(run.latency_ms),
+                    run.claims_per_decision,
+                    run.besides_hz,
                     run.lost + run.ended,
                     run.load,
                 )

@@ -237,6 +237,65 @@ def test_order_of_the_fleet_waits_for_keys_and_router(compose: dict[str, Any]) -
                 assert "healthcheck" in services[other]
 
 
+@pytest.fixture(scope="module")
+def machine() -> dict[str, Any]:
+    loaded = yaml.safe_load((DEPLOY / "compose.machine.yaml").read_text())
+    assert isinstance(loaded, dict)
+    return loaded
+
+
+def said_by(script: str, folder: Path, environment: Mapping[str, str]) -> list[list[str]]:
+    """Command lines of `swarm` that a script of the compose file comes to."""
+    stub, said = folder / "swarm", folder / "said"
+    stub.write_text('#!/bin/sh\n(printf "%s\\t" "$@"; echo) >>"$SAID"\n')
+    stub.chmod(0o755)
+    said.unlink(missing_ok=True)
+    shell = shutil.which("sh")
+    assert shell is not None
+    path = f"{folder}:/usr/bin:/bin"
+    subprocess.run(
+        [shell, "-euc", script.replace("$$", "$")],
+        env={"PATH": path, "SAID": str(said), **environment},
+        check=True,
+    )
+    return sorted(line.split("\t")[:-1] for line in said.read_text().splitlines())
+
+
+def test_every_process_of_one_of_several_machines_is_a_command_line_that_is_accepted(
+    machine: dict[str, Any], keys: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("SWARM_DASHBOARD_TOKEN", "simulated-fleet-only")
+    place = {
+        "PECKORDER_MISSION": "meadow",
+        "PECKORDER_UAVS": "uav2 uav3",
+        "PECKORDER_FIRST_ID": "2",
+        "PECKORDER_OTHERS": "tls/machine-a:7447 tls/machine-b:7447",
+        "PECKORDER_ROUTER": "router-2",
+        "PECKORDER_LINK": "normal",
+    }
+    lines: dict[str, list[list[str]]] = {}
+    for name, service in machine["services"].items():
+        (script,) = service["command"]
+        assert place.keys() <= service["environment"].keys()
+        lines[name] = said_by(script, tmp_path, place)
+        for line in lines[name]:
+            words = [word.replace("/keys/", f"{keys}/").replace("/scenario.toml", "meadow")
+                     for word in line]  # fmt: skip
+            if name == "autopilots":
+                assert parsed(words)["uav"] == ["uav2", "uav3"]
+            else:
+                cli.check(words)  # opens the keys, too
+
+    others = ["--connect", "tls/machine-a:7447", "--connect", "tls/machine-b:7447"]
+    assert lines["router"][0][-4:] == others
+    flown = [parsed(words) for words in lines["agents"]]
+    assert [(each["uav"], each["system_id"]) for each in flown] == [("uav2", 2), ("uav3", 3)]
+    assert [str(each["mavlink"]) for each in flown] == [
+        "tcp:autopilots:20001",
+        "tcp:autopilots:20002",
+    ]
+
+
 def instructions() -> list[tuple[str, str]]:
     """Of the Containerfile, continued lines joined."""
     text = re.sub(r"^\s*#.*\n", "", (DEPLOY / "Containerfile").read_text(), flags=re.MULTILINE)

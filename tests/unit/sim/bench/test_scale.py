@@ -38,7 +38,7 @@ SMALL = ScaleRun(
     watched_s=10.0,
     cpu_frac={AGENTS: 0.04, "routers": 0.01},
     agent_share_bytes=(20_000_000, 30_000_000),
-    published_hz={"status": 5.0, "claim": 0.5},
+    published_hz={"status": 5.0, "claim": 0.5, "choice": 0.25},
     received_hz={"claim": 0.5, "epoch": 0.5},
     latency_ms=(1.0, 2.0, 30.0),
     lost=0,
@@ -88,7 +88,8 @@ def test_what_follows_from_the_figures_is_told_with_them() -> None:
 
     assert first["agent_cpu_frac"] == pytest.approx(0.02)
     assert first["agent_share_mean_bytes"] == 25e6
-    assert (first["said_hz"], first["heard_hz"]) == (5.5, 1.0)
+    assert (first["said_hz"], first["heard_hz"]) == (5.75, 1.0)
+    assert (first["claims_per_decision"], first["besides_hz"]) == (2.0, 0.5)
     assert (first["latency_p50_ms"], first["latency_p99_ms"]) == (2.0, 30.0)
     assert second["latency_p99_ms"] is None
     json.dumps(told, allow_nan=False)
@@ -112,6 +113,7 @@ def test_the_picture_is_drawn_also_where_something_never_came(tmp_path: Path) ->
 
 def test_no_message_at_all_is_no_fault() -> None:
     silent = replace(SMALL, published_hz={}, received_hz={})
+    assert silent.claims_per_decision is None
     assert ScaleBench(this_machine(), ScaleSettings((2,)), (silent,)).as_markdown()
     assert published_hz(Counter(), 2, 1.0) == {}
 
