@@ -39,6 +39,7 @@ from swarm.protocol.fields import Point
 from swarm.protocol.messages import Message, MissionConfig, Stamp
 from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import MOST_CORNERS_AHEAD, Nearby
+from swarm.separation.straight_pieces import off_piece_m
 from swarm.separation.tactical import Advice, Maneuver, OwnFlight, TacticalResolver
 from swarm.separation.tactical_rules import cell_around, cell_m, cells_near, rules_of
 from swarm.separation.tactical_traffic import (
@@ -399,19 +400,7 @@ def _is_past(place: Point, way: Sequence[Point]) -> bool:
     here, corner, after = way[0], way[1], way[2]
     if math.dist(place, corner) <= _FLOWN_M:
         return True
-    return _off(place, corner, after) + 1.0 < _off(place, here, corner)
-
-
-def _off(place: Point, begin: Point, end: Point) -> float:
-    """Distance of a place from a straight piece [m]."""
-    along = [b - a for a, b in zip(begin, end, strict=True)]
-    away = [p - a for a, p in zip(begin, place, strict=True)]
-    length2 = sum(each * each for each in along)
-    if length2 <= 0.0:
-        return math.dist(place, begin)
-    share = sum(a * b for a, b in zip(along, away, strict=True)) / length2
-    share = min(1.0, max(0.0, share))
-    return math.dist(place, [a + share * d for a, d in zip(begin, along, strict=True)])
+    return off_piece_m(place, corner, after) + 1.0 < off_piece_m(place, here, corner)
 
 
 def _order_of(advice: Advice) -> GiveWay:

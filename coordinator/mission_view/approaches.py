@@ -70,7 +70,7 @@ def approach_as_json(near: Approach | None, separation_m: float | None) -> dict[
     }
 
 
-class _Fix(NamedTuple):
+class Fix(NamedTuple):
     """A UAV in flight, as it told."""
 
     at_s: float
@@ -99,7 +99,7 @@ class ObservedApproaches:
     def __init__(self, gap_s: float, near_m: float | None = None) -> None:
         self._gap_s = gap_s
         self.near_m = near_m
-        self._last: dict[str, _Fix] = {}
+        self._last: dict[str, Fix] = {}
         """The newest of each UAV in flight."""
         self._uavs: list[str] = []
         self._index: dict[str, int] = {}
@@ -125,7 +125,7 @@ class ObservedApproaches:
         last = self._last.get(uav)
         if last is not None and last.started == started and at_s <= last.at_s:
             return
-        fix = self._last[uav] = _Fix(at_s, started, place_enu_m, velocity_enu_m_s)
+        fix = self._last[uav] = Fix(at_s, started, place_enu_m, velocity_enu_m_s)
         if last is None or last.started != started or at_s - last.at_s > self._gap_s:
             return
         if uav not in self._index:
@@ -158,14 +158,19 @@ class ObservedApproaches:
         ]
         return sorted(found, key=_order)
 
-    def nearest_now(self, mission_s: float | None, now_s: float) -> Approach | None:
-        """The two in flight that are nearest to each other, carried on by their velocities."""
+    def flying(self, mission_s: float | None, now_s: float) -> dict[str, Fix]:
+        """Who is in flight now, and where it was when it told that last."""
         at_s, started = (now_s, False) if mission_s is None else (mission_s, True)
-        flying = [
-            (uav, fix)
+        return {
+            uav: fix
             for uav, fix in self._last.items()
             if fix.started == started and abs(at_s - fix.at_s) <= self._gap_s
-        ]
+        }
+
+    def nearest_now(self, mission_s: float | None, now_s: float) -> Approach | None:
+        """The two in flight that are nearest to each other, carried on by their velocities."""
+        at_s = now_s if mission_s is None else mission_s
+        flying = list(self.flying(mission_s, now_s).items())
         if len(flying) < 2:
             return None
         places_m = np.array([_carried_on(fix, at_s) for _, fix in flying])
@@ -307,7 +312,7 @@ def _places(pieces: FloatArray, at_s: FloatArray) -> FloatArray:
     return pieces[:, _FROM] + flown_m
 
 
-def _piece(number: int, begin: _Fix, end: _Fix) -> tuple[float, ...]:
+def _piece(number: int, begin: Fix, end: Fix) -> tuple[float, ...]:
     """The way from one fix to the next."""
     lasts_s = end.at_s - begin.at_s
     way_m = [b - a for a, b in zip(begin.place_enu_m, end.place_enu_m, strict=True)]
@@ -324,7 +329,7 @@ def _piece(number: int, begin: _Fix, end: _Fix) -> tuple[float, ...]:
     return (number, begin.started, begin.at_s, end.at_s, *ends_m, bent_m + odd_m)
 
 
-def _carried_on(fix: _Fix, at_s: float) -> list[float]:
+def _carried_on(fix: Fix, at_s: float) -> list[float]:
     """Where it is then if it flies on as it told."""
     since_s = max(0.0, at_s - fix.at_s)
     velocity_m_s = fix.velocity_enu_m_s or (0.0, 0.0, 0.0)

@@ -20,6 +20,7 @@ from coordinator.mission_view.narrator import MissionNarrator
 from coordinator.mission_view.observed_flights import ObservedFlights
 from coordinator.mission_view.observed_limits import ObservedLimits
 from coordinator.mission_view.pace import PacedClock
+from coordinator.mission_view.predicted_conflicts import ConflictForecast, PredictedConflict
 from coordinator.mission_view.results import MissionResult
 from coordinator.mission_view.story import EventKind, MissionEvent
 from swarm.model import Mission, Plan, UavId
@@ -102,6 +103,7 @@ class MissionState:
         self.limits = ObservedLimits()
         """How near they came to zones and to the end of their batteries, likewise."""
         self._ways: FleetWays | None = None
+        self._forecast = ConflictForecast()
         self._flown = FlownMission(mission, self.board)
         self._reports = FleetReports(self.replica)
         self.statuses = self._reports.statuses
@@ -286,6 +288,14 @@ class MissionState:
     def nearest_now(self, now_s: float) -> Approach | None:
         """The two in flight that are nearest to each other now."""
         return self.flights.approaches.nearest_now(self.mission_s(now_s), now_s)
+
+    def conflicts(self, now_s: float) -> tuple[PredictedConflict, ...]:
+        """Who would soon come too near to whom, the soonest first."""
+        mission_s = self.mission_s(now_s)
+        flying = self.flights.approaches.flying(mission_s, now_s)
+        return self._forecast.conflicts(
+            self.replica, flying, now_s if mission_s is None else mission_s
+        )
 
     def executed_schedule(self) -> Schedule:
         """Every UAV's list as it has flown it, as far as it is known."""

@@ -29,6 +29,8 @@ class Signs:
     uav: str
     uav_lost: str
     base: str
+    conflict: str
+    """Where two UAVs would come too near to each other."""
     bar_full: str
     bar_empty: str
     bar_mark: str
@@ -64,6 +66,7 @@ UNICODE = Signs(
     uav="▲",
     uav_lost="▽",
     base="⌂",
+    conflict="╳",
     bar_full="█",
     bar_empty="░",
     bar_mark="┃",
@@ -89,6 +92,7 @@ ASCII = Signs(
     uav="^",
     uav_lost="!",
     base="B",
+    conflict="X",
     bar_full="#",
     bar_empty=".",
     bar_mark="|",

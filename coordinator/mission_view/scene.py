@@ -10,6 +10,7 @@ from typing import Any
 from coordinator.mission_view.approaches import Approach
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import deserted
+from coordinator.mission_view.predicted_conflicts import PredictedConflict
 from coordinator.mission_view.results import lists_objective
 from coordinator.mission_view.uav_state import FleetStates, UavState, UavView
 from coordinator.mission_view.wording import short_names
@@ -91,6 +92,13 @@ class Scene:
     """The two UAVs in flight that are nearest to each other."""
     nearest: Approach | None = None
     """The nearest that two have come to each other so far."""
+    conflicts: tuple[PredictedConflict, ...] = ()
+    """Who would soon come too near to whom, the soonest first."""
+
+    @property
+    def about_to_meet(self) -> frozenset[str]:
+        """UAVs that would soon come too near to another one."""
+        return frozenset(uav for conflict in self.conflicts for uav in conflict.uavs)
 
     @property
     def aborted(self) -> bool:
@@ -185,6 +193,7 @@ def scene_of(mission_state: MissionState, now_s: float) -> Scene:
         zone_edits=tuple(zone_edits(mission_state.replica).values()),
         nearest_now=mission_state.nearest_now(now_s),
         nearest=mission_state.nearest,
+        conflicts=mission_state.conflicts(now_s),
     )
 
 

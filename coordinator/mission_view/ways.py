@@ -8,10 +8,8 @@ missions have none of this: their ways are straight, and begin and end at tasks.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 
 from coordinator.mission_view.flown_ways import MapPoint
 from coordinator.mission_view.observed_flights import ObservedFlights
@@ -210,22 +208,3 @@ class _GrowingPath:
         for east_m, north_m in points:
             if not self._points or self._points[-1] != (east_m, north_m):
                 self._points.append((east_m, north_m))
-
-
-def still_ahead(leg: MapPath, place: MapPoint) -> MapPath:
-    """What is left of the leg of a UAV at ``place``, with that: corners behind it are left out."""
-    if len(leg) < 2:
-        return (place, *leg[-1:])
-    away_m = [_away_m(place, *piece) for piece in pairwise(leg)]
-    nearest = min(range(len(away_m)), key=away_m.__getitem__)
-    return (place, *leg[nearest + 1 :])
-
-
-def _away_m(place: MapPoint, begin: MapPoint, end: MapPoint) -> float:
-    """Distance of a place from a straight piece [m]."""
-    along = end[0] - begin[0], end[1] - begin[1]
-    from_begin = place[0] - begin[0], place[1] - begin[1]
-    square = along[0] * along[0] + along[1] * along[1]
-    share = (along[0] * from_begin[0] + along[1] * from_begin[1]) / square if square else 0.0
-    share = min(1.0, max(0.0, share))
-    return math.hypot(from_begin[0] - share * along[0], from_begin[1] - share * along[1])

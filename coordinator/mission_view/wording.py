@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from typing import Final
 
 from coordinator.mission_view.approaches import Approach
+from coordinator.mission_view.predicted_conflicts import PredictedConflict
 from swarm.model.ids import FLEET
 from swarm.model.plan import LeftOut
 from swarm.protocol.board import claim_strength
@@ -215,6 +216,12 @@ def approach_in_words(near: Approach, *, told_at: bool = True) -> str:
     up = " and ".join(f"{place[2]:.4g}" for place in near.places_enu_m)
     between = 0.5 * (one[0] + other[0]), 0.5 * (one[1] + other[1]), 0.0
     return f"{apart}, {place_in_words(between)}, {up} m up"
+
+
+def conflict_in_words(conflict: PredictedConflict) -> str:
+    """Who would soon come too near to whom."""
+    apart = f"{' and '.join(conflict.uavs)} {shown_m(conflict.distance_m)} m"
+    return f"{apart} in {conflict.in_s:.0f} s"
 
 
 def lateness_in_words(late_s: float) -> str:

@@ -26,8 +26,11 @@ _DONE_CELLS = 5
 _BATTERY_CELLS = 5
 _SORTIE_CELLS = 7
 _SWAPS_CELLS = 6
+_HEIGHT_CELLS = 6
 _LONGEST_ID = 12
 _SHORTEST_NOTE = 10
+_SOON_S = 60.0
+"""Who has to land within that is worth a look."""
 _GAP = 2
 """Columns between two tables side by side."""
 
@@ -52,6 +55,8 @@ class _ColumnWidths:
     sorties: bool
     """Whether batteries end, so that it matters how long they last and how often they are
     changed."""
+    heights: bool
+    """Whether UAVs share height layers, so that it matters in which each is."""
     eta_digits: int
 
     @property
@@ -59,8 +64,9 @@ class _ColumnWidths:
         """All columns, without room for notes."""
         battery = _BATTERY_CELLS if self.battery else 0
         sorties = _SORTIE_CELLS + _SWAPS_CELLS if self.sorties else 0
+        heights = _HEIGHT_CELLS if self.heights else 0
         before_task = 2 + self.id + 1 + _DOES_CELLS + 1
-        return before_task + self.task + _ETA_CELLS + _DONE_CELLS + battery + sorties
+        return before_task + self.task + _ETA_CELLS + _DONE_CELLS + battery + sorties + heights
 
 
 def table_width(scene: Scene) -> int:
@@ -71,8 +77,8 @@ def table_width(scene: Scene) -> int:
 def fleet_table(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]:
     """The table: ``height`` lines of at most ``width`` cells.
 
-    A fleet that does not fit is shown in several columns; if it still does not fit, those
-    in trouble and those at work come first, and the last line counts the others.
+    A fleet that does not fit is shown in several columns; if it still does not fit, those come
+    first that are to be looked at (`_urgency`), and the last line counts the others.
     """
     columns = _columns(scene)
     rows = max(0, height - 1)
@@ -84,7 +90,8 @@ def fleet_table(scene: Scene, width: int, height: int, signs: Signs) -> list[Tex
     hidden: Sequence[UavView] = ()
     if len(shown) > rows * blocks:
         rows = max(0, rows - 1)
-        by_urgency = sorted(scene.uavs, key=_urgency)
+        meeting = scene.about_to_meet
+        by_urgency = sorted(scene.uavs, key=lambda uav: _urgency(uav, meets=uav.id in meeting))
         shown, hidden = by_urgency[: rows * blocks], by_urgency[rows * blocks :]
     lines = [_joined([_heading(columns, block_width, signs)] * blocks, block_width)]
     for row in range(min(rows, len(shown))):
@@ -143,6 +150,7 @@ def _columns(scene: Scene) -> _ColumnWidths:
         task=min(_LONGEST_ID, max(4, longest_task)),
         battery=any(uav.battery_frac is not None for uav in scene.uavs),
         sorties=scene.has_sorties,
+        heights=scene.mission.separation_m is not None,
         eta_digits=2 if scene.mission.horizon_s < 100.0 else 0,
     )
 
@@ -154,6 +162,8 @@ def _heading(columns: _ColumnWidths, width: int, signs: Signs) -> Text:
         text += f"{'batt':>{_BATTERY_CELLS}}"
     if columns.sorties:
         text += f"{'left':>{_SORTIE_CELLS}}{'swaps':>{_SWAPS_CELLS}}"
+    if columns.heights:
+        text += f"{'up':>{_HEIGHT_CELLS}}"
     return Text(fit_cells(text, width, signs), "dim")
 
 
@@ -182,6 +192,9 @@ def _row(uav: UavView, columns: _ColumnWidths, width: int, signs: Signs) -> Text
     if columns.sorties:
         left = "" if uav.sortie_left_s is None else f"{uav.sortie_left_s:.0f} s"
         row.append(f"{left:>{_SORTIE_CELLS}}{uav.swaps:>{_SWAPS_CELLS}}")
+    if columns.heights:
+        up = "" if uav.in_layer_enu_m is None else f"{uav.in_layer_enu_m[2]:.0f} m"
+        row.append(f"{up:>{_HEIGHT_CELLS}}")
     room = width - row.cell_len - _GAP
     if note and room >= _SHORTEST_NOTE:
         row.append(" " * _GAP + fit_cells(note, room, signs), "dim")
@@ -194,13 +207,18 @@ def _eta(uav: UavView, digits: int) -> str:
     return f"{uav.eta_s:.{digits}f} s" if uav.eta_s > 0.0 else "now"
 
 
-def _urgency(uav: UavView) -> int:
-    """Trouble first, then those that keep the others waiting, then the busy."""
+def _urgency(uav: UavView, *, meets: bool) -> int:
+    """Trouble first, then who is about to meet another one or has to land soon, then those that
+    keep the others waiting, then the busy."""
     if uav.troubled or uav.silent_s is not None:
         return 0
-    if uav.unready:
+    if meets:
         return 1
-    return 2 if uav.busy else 3
+    if uav.battery_low or (uav.sortie_left_s is not None and uav.sortie_left_s < _SOON_S):
+        return 2
+    if uav.unready or uav.does == StatusPhase.HOLDING:
+        return 3
+    return 4 if uav.busy else 5
 
 
 def _joined(cells: Sequence[Text], width: int) -> Text:

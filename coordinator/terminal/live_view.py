@@ -26,7 +26,7 @@ from coordinator.mission_view.presentation import (
 from coordinator.mission_view.results import refusals
 from coordinator.mission_view.scene import LEFT_OUT, TAKEN, Scene, scene_of
 from coordinator.mission_view.story import MissionEvent
-from coordinator.mission_view.wording import clean, shown_m, shown_value
+from coordinator.mission_view.wording import clean, conflict_in_words, shown_m, shown_value
 from coordinator.terminal.fleet_table import alerts, fit_cells, fleet_table, table_width, task_lists
 from coordinator.terminal.map_panel import ideal_width, map_panel
 from swarm.protocol.board import TaskState
@@ -289,10 +289,22 @@ def _worth(scene: Scene, width: int, signs: Signs) -> list[Text]:
     if width < _WIDE - _COLUMN:
         bar_width = max(0, width - 8)
         bar = Text("       ").append_text(_bar(scene, bar_width, signs))
-        return [counts, value, bar, *_nearest(scene, width, signs)]
+        return [counts, value, bar, *_near(scene, width, signs)]
     value.append("  ")
     value.append_text(_bar(scene, min(60, bar_width), signs))
-    return [counts, value, *_nearest(scene, width, signs)]
+    return [counts, value, *_near(scene, width, signs)]
+
+
+def _near(scene: Scene, width: int, signs: Signs) -> list[Text]:
+    """Who is near to whom, who has been, and who would soon come too near."""
+    lines = _nearest(scene, width, signs)
+    if scene.conflicts:
+        soonest, more = conflict_in_words(scene.conflicts[0]), len(scene.conflicts) - 1
+        told = f"{soonest}{f', and {more} more' if more else ''}"
+        shown = clean(told, ascii_only=not signs.braille)
+        line = Text(f"{'meet':<7}", BAD)
+        lines.append(line.append(fit_cells(shown, width - 7, signs).rstrip(), BAD))
+    return lines
 
 
 def _nearest(scene: Scene, width: int, signs: Signs) -> list[Text]:

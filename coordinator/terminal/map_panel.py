@@ -19,6 +19,7 @@ from coordinator.mission_view.scene import Scene, TaskView
 from coordinator.mission_view.uav_state import UavView
 from swarm.model.rings import Ring
 from swarm.protocol.board import TaskState
+from swarm.separation.straight_pieces import still_ahead
 
 if TYPE_CHECKING:
     from coordinator.mission_view.ways import MapPath
@@ -157,10 +158,15 @@ def map_panel(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]
     tasks = [task for task in scene.tasks if task.state is not TaskState.WITHDRAWN]
     for task in sorted(tasks, key=_weight):
         canvas.put(view.spot(task.position_enu_m), *_task_look(task, signs))
+    for conflict in scene.conflicts:
+        (east_m, north_m, up_m), (to_east_m, to_north_m, _) = conflict.places_enu_m
+        middle = 0.5 * (east_m + to_east_m), 0.5 * (north_m + to_north_m), up_m
+        canvas.put(view.spot(middle), signs.conflict, BAD)
     # Names of UAVs come first, and the UAVs themselves over everything.
     for uav in scene.uavs:
         canvas.put(view.spot(uav.place_enu_m), *_uav_look(uav, signs))
-    for uav in sorted(scene.uavs, key=lambda uav: not uav.troubled):
+    meeting = scene.about_to_meet
+    for uav in sorted(scene.uavs, key=lambda uav: not (uav.troubled or uav.id in meeting)):
         style = _uav_look(uav, signs)[1]
         canvas.name(view.spot(uav.place_enu_m), (uav.id, uav.short), style)
     longest = max((len(task.id) for task in tasks), default=0)
@@ -269,8 +275,6 @@ def _draw_ways(canvas: Canvas, view: _View, scene: Scene, room: float) -> None:
     """Ways in the field: ahead and home below what was flown, and what is flown now on top."""
     if all(uav.ways is None for uav in scene.uavs):
         return
-    # Plain missions never load it.
-    from coordinator.mission_view.ways import still_ahead
 
     def draw(path: MapPath, style: str, every: int) -> None:
         for first, last in pairwise(path):

@@ -17,6 +17,7 @@ from coordinator.mission_view.wording import (
     because,
     clean,
     command_in_words,
+    conflict_in_words,
     counted,
     left_out_in_words,
     listed,
@@ -29,6 +30,8 @@ from swarm.protocol.board import TaskState
 
 _MOST_LEFT_OUT = 8
 """Tasks named that are left out."""
+_MOST_CONFLICTS = 4
+"""Conflicts named, the soonest."""
 
 
 def status_as_json(scene: Scene) -> dict[str, Any]:
@@ -65,6 +68,7 @@ def status_as_json(scene: Scene) -> dict[str, Any]:
         },
         **approach_as_json(scene.nearest, scene.mission.separation_m),
         "nearest_now": None if scene.nearest_now is None else scene.nearest_now.as_json(),
+        "predicted_conflicts": [conflict.as_json() for conflict in scene.conflicts],
         "uavs": [_uav_as_json(uav) for uav in scene.uavs],
         "dropped": scene.dropped_by_reason,
     }
@@ -106,6 +110,9 @@ def status_table(scene: Scene, width: int, signs: Signs) -> RenderableType:
         if near is not None:
             style = BAD if near.is_within(scene.mission.separation_m) else ""
             facts.add_row(name, Text(approach_in_words(near), style))
+    if scene.conflicts:
+        told = listed([conflict_in_words(each) for each in scene.conflicts], _MOST_CONFLICTS)
+        facts.add_row("about to meet", Text(told, BAD))
     there = Text("there") if scene.coordinator else Text("not there", BAD)
     facts.add_row("coordinator", there)
     if scene.others:

@@ -150,13 +150,28 @@ def least_distance_m(
 
 
 def least_meeting_m(some_m: FloatArray, others_m: FloatArray) -> float:
-    """Between places of the same moment [m]; both of shape (samples, 3).
+    """Between places of the same moment [m]; both of shape (samples, 3)."""
+    return float(meetings(some_m[None], others_m[None])[0][0])
+
+
+def meetings(some_m: FloatArray, others_m: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """When pairs of motions are nearest, and how near.
 
     Between two samples both are taken to move evenly, so that nobody slips through.
+
+    Args:
+        some_m: (n, samples, 3) places at the same moments as
+        others_m: (n, samples, 3).
+
+    Returns:
+        (n,) distances [m], and (n,) when, in samples from the first.
     """
     apart_m = some_m - others_m
-    steps_m = np.diff(apart_m, axis=0)
-    length2 = np.maximum(np.einsum("ij,ij->i", steps_m, steps_m), 1e-12)
-    share = np.clip(-np.einsum("ij,ij->i", apart_m[:-1], steps_m) / length2, 0.0, 1.0)
-    nearest_m = apart_m[:-1] + share[:, None] * steps_m
-    return float(np.sqrt(np.min(np.einsum("ij,ij->i", nearest_m, nearest_m))))
+    steps_m = np.diff(apart_m, axis=1)
+    length2 = np.maximum(np.einsum("nij,nij->ni", steps_m, steps_m), 1e-12)
+    share = np.clip(-np.einsum("nij,nij->ni", apart_m[:, :-1], steps_m) / length2, 0.0, 1.0)
+    nearest_m = apart_m[:, :-1] + share[..., None] * steps_m
+    square = np.einsum("nij,nij->ni", nearest_m, nearest_m)
+    step = square.argmin(axis=1)
+    rows = np.arange(len(square))
+    return np.sqrt(square[rows, step]), step + share[rows, step]

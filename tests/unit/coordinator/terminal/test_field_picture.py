@@ -11,7 +11,6 @@ from rich.console import Console
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.presentation import UNICODE
 from coordinator.mission_view.scene import scene_of
-from coordinator.mission_view.ways import still_ahead
 from coordinator.terminal.live_view import live_picture
 from coordinator.terminal.status_table import status_as_json, status_table
 from swarm.model import Area, AreaId, Base, BaseId, Mission, TaskId, Zone, ZoneId
@@ -19,6 +18,7 @@ from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.model.plan import LeftOut, Plan
 from swarm.protocol.field_messages import ZoneEdit, ZoneSpec
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase, StatusPhase
+from swarm.separation.straight_pieces import still_ahead
 from tests.support import field_registers
 from tests.support.builders import brief_of, entries_of, epoch, mission, task, uav
 from tests.support.observed_mission import Teller
