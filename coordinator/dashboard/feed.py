@@ -6,25 +6,29 @@ to some look, however long ago; clients that are in step share one text.
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from dataclasses import dataclass
 from itertools import takewhile
-from typing import TYPE_CHECKING
 
 import swarm
 from coordinator.dashboard.baseline import Baseline, baseline_of
+from coordinator.dashboard.row_values import (
+    approach_values,
+    choice_values,
+    conflict_values,
+    mission_text,
+    rounded,
+    uav_values,
+    ways_values,
+)
 from coordinator.dashboard.rows import AppendOnlyTable, RowTable, as_text
 from coordinator.dashboard.source import DashboardSource
-from coordinator.mission_view.approaches import Approach
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.results import Progress, progress_of
 from coordinator.mission_view.scene import LEFT_OUT, TAKEN, task_stands
-from coordinator.mission_view.uav_state import LOST, FleetStates, UavState
+from coordinator.mission_view.uav_state import FleetStates
 from coordinator.mission_view.wording import (
     clean,
-    short_names,
-    visit_reason_in_words,
     why_left_out,
 )
 from swarm.allocation.problem import Problem
@@ -37,12 +41,8 @@ from swarm.protocol.operator_commands import (
     zone_edits,
     zones_in_force,
 )
-from swarm.protocol.uav_messages import Choice
 
-if TYPE_CHECKING:
-    from coordinator.mission_view.ways import UavWays
-
-PROTOCOL = 1
+PROTOCOL = 2
 _STORY, _CHOICES, _CURVE, _COMMANDS = 500, 300, 600, 200
 _MEASURES = 8
 """Flights of which it is remembered how they began."""
@@ -75,8 +75,8 @@ class Feed:
         self._mission_state: MissionState | None = None
         self._brief: MissionConfig | None = None
         self._head: dict[str, object] = {}
-        self._uavs, self._tasks, self._lists = RowTable(), RowTable(), RowTable()
-        self._zones = RowTable()
+        self._uavs, self._tasks = RowTable("id", but="silent_s"), RowTable("id")
+        self._lists, self._zones = RowTable("uav"), RowTable("id")
         self._story = AppendOnlyTable(_STORY)
         self._told = 0
         self._choices = AppendOnlyTable(_CHOICES)
@@ -88,7 +88,7 @@ class Feed:
         """As of which look each point is there."""
         self._measures: dict[tuple[str, int], Baseline] = {}
         """By mission and run."""
-        self._commands = RowTable(_COMMANDS)
+        self._commands = RowTable("n", keep=_COMMANDS)
         self._frames: dict[int | None, str] = {}
         """Of the newest look, by what the client has seen."""
 
@@ -167,7 +167,7 @@ class Feed:
         for given in list(self._source.commands)[-_COMMANDS:]:
             row: dict[str, object] = {"n": given.n, "text": clean(given.text)}
             row |= {"state": given.state, "result": clean(given.result)}
-            self._commands.put(given.n, row, self.seq)
+            self._commands.put(row, self.seq)
         mission_state = self._source.mission_state
         brief = None if mission_state is None else mission_state.replica.brief
         if mission_state is not self._mission_state or brief is not self._brief:
@@ -179,7 +179,7 @@ class Feed:
         for number, happening in enumerate(news, mission_state.told - len(news) + 1):
             row = {
                 "n": number,
-                "mission_s": _rounded(happening.mission_s, 3),
+                "mission_s": rounded(happening.mission_s, 3),
                 "text": clean(happening.text),
                 "trouble": happening.is_trouble,
             }
@@ -203,7 +203,7 @@ class Feed:
         self._whole_since, self.mission_seq = self.seq, self.seq
         self.mission = None
         if mission_state is not None and brief is not None:
-            self.mission = _mission_text(mission_state.mission.name, brief)
+            self.mission = mission_text(mission_state.mission.name, brief)
 
     def _look_at_choices(self, mission_state: MissionState) -> None:
         """Take in those that have come since: the observer forgets old ones."""
@@ -213,7 +213,7 @@ class Feed:
         for told in reversed(new):
             self._chosen += 1
             uav, _, choice = told
-            self._choices.add(as_text(_choice_row(self._chosen, uav, choice)), self.seq)
+            self._choices.add(as_text(choice_values(self._chosen, uav, choice)), self.seq)
             self._last_choice = told
 
     def _head_of(self, mission_state: MissionState | None, now_s: float) -> dict[str, object]:
@@ -228,7 +228,7 @@ class Feed:
             plan = self._look_at_plan(mission_state)
             present = mission_state.present
             dropped = sum(mission_state.dropped.values(), dropped)
-            head["mission_s"] = _rounded(mission_state.mission_s(now_s), 3)
+            head["mission_s"] = rounded(mission_state.mission_s(now_s), 3)
             head["phase"] = mission_state.phase
         fleet = () if self._brief is None else (uav.id for uav in self._brief.uavs)
         player = self._source.player
@@ -237,18 +237,23 @@ class Feed:
             "reason": "" if epoch is None else clean(epoch.reason),
             "rule": None if epoch is None else epoch.rule,
             "sequence": [] if epoch is None else epoch.sequence,
-            "objective": _rounded(0.0 if self._progress is None else self._progress.objective, 4),
+            "objective": rounded(0.0 if self._progress is None else self._progress.objective, 4),
             "plan": {
-                "objective": None if plan is None else _rounded(plan.objective, 4),
-                "bound": None if plan is None else _rounded(plan.bound, 4),
+                "objective": None if plan is None else rounded(plan.objective, 4),
+                "bound": None if plan is None else rounded(plan.bound, 4),
             },
             "coordinator": COORDINATOR in present,
             "aborted": mission_state is not None
             and abort_command(mission_state.replica) is not None,
             "nearest": {
-                "now": None if mission_state is None else _near(mission_state.nearest_now(now_s)),
-                "so_far": None if mission_state is None else _near(mission_state.nearest),
+                "now": None
+                if mission_state is None
+                else approach_values(mission_state.nearest_now(now_s)),
+                "so_far": None if mission_state is None else approach_values(mission_state.nearest),
             },
+            "conflicts": []
+            if mission_state is None
+            else [conflict_values(each) for each in mission_state.conflicts(now_s)],
             "counts": counts,
             "dropped": dict(dropped.most_common()),
             "dropped_here": dict(self._source.dropped),
@@ -256,7 +261,7 @@ class Feed:
             "recording": None
             if player is None
             else {
-                "t_s": _rounded(player.state.t_s, 2),
+                "t_s": rounded(player.state.t_s, 2),
                 "playing": player.state.playing,
                 "speed": player.state.speed,
             },
@@ -290,7 +295,6 @@ class Feed:
             counts[task_stands(state, taken=taken, left_out=why is not None)] += 1
             entry = replica.board[task]
             self._tasks.put(
-                task,
                 {
                     "id": task,
                     "position": entry.position_enu_m,
@@ -307,7 +311,7 @@ class Feed:
                     "left_out": why,
                     "why": None if why is None else why_left_out(why),
                     "uav": holder if done is None else done[0],
-                    "completed_s": None if done is None else _rounded(done[1], 3),
+                    "completed_s": None if done is None else rounded(done[1], 3),
                     "by": "scenario" if replica.ordered(task) is None else "operator",
                 },
                 self.seq,
@@ -323,8 +327,8 @@ class Feed:
                 "flown": tuple(flown.get(uav.id, ())),
             }
             if uav.id in ways:
-                row["ways"] = _ways_row(ways[uav.id])
-            self._lists.put(uav.id, row, self.seq)
+                row["ways"] = ways_values(ways[uav.id])
+            self._lists.put(row, self.seq)
 
     def _look_at_progress(self, problem: Problem, mission_state: MissionState) -> None:
         before = [] if self._progress is None else self._progress.curve
@@ -345,9 +349,9 @@ class Feed:
         for uav in brief.uavs:
             command = commands.get(uav.id)
             kind = None if command is None else command.kind
-            row = _uav_row(states.of(uav.id), kind, self._source.speedup)
-            self._uavs.put(uav.id, row, self.seq, but="silent_s")
-            self._uavs.touch(uav.id, row, self.seq, _QUIET_LOOKS)
+            row = uav_values(states.of(uav.id), kind, self._source.speedup)
+            self._uavs.put(row, self.seq)
+            self._uavs.touch(row, self.seq, _QUIET_LOOKS)
 
     def _look_at_zones(self, mission_state: MissionState) -> None:
         replica = mission_state.replica
@@ -365,117 +369,4 @@ class Feed:
                 "by": "operator" if name in edits else "scenario",
                 "withdrawn": name not in drawn,
             }
-            self._zones.put(name, row, self.seq)
-
-
-def _uav_row(state: UavState, command: str | None, speedup: float) -> dict[str, object]:
-    age_s, in_layer = state.link_age_s, state.in_layer_enu_m
-    return {
-        "id": state.id,
-        "does": state.now_does,
-        "task": state.now_task,
-        "claim": state.claim,
-        "eta_s": _rounded(state.now_eta_s, 1),
-        "position": _point(state.told_enu_m),
-        "velocity": _point(state.velocity_enu_m_s),
-        "height_m": None if in_layer is None else _rounded(in_layer[2], 1),
-        "battery": _rounded(state.battery_frac, 3),
-        "base": state.base,
-        "stage": state.stage,
-        "visit": state.visit,
-        "sortie_end_s": _rounded(state.sortie_end_s, 1),
-        "swaps": state.swaps,
-        "silent_s": None if age_s is None else _rounded(age_s / speedup, 1),
-        "lost": state.does == LOST,
-        "present": state.there,
-        "note": clean(state.note),
-        "command": command,
-        "dropped": dict(state.dropped),
-    }
-
-
-def _near(near: Approach | None) -> dict[str, object] | None:
-    if near is None:
-        return None
-    return {
-        "uavs": near.uavs,
-        "distance_m": _rounded(near.distance_m, 2),
-        "error_m": _rounded(near.error_m, 2),
-        "at_s": _rounded(near.at_s, 2),
-        "places": [_point(place) for place in near.places_enu_m],
-    }
-
-
-def _ways_row(ways: UavWays) -> dict[str, object]:
-    """Points of its ways in the field [m]."""
-    paths = {"flown": ways.flown, "leg": ways.leg, "ahead": ways.ahead}
-    return {name: [[round(m, 1) for m in point] for point in path] for name, path in paths.items()}
-
-
-def _mission_text(name: str, brief: MissionConfig) -> str:
-    shorts = short_names([uav.id for uav in brief.uavs])
-    uavs = [
-        {
-            "id": uav.id,
-            "short": short,
-            "start": uav.position_enu_m,
-            "speed_m_s": uav.speed_m_s,
-            "kind": uav.kind,
-            "layer_m": uav.layer_m,
-            "endurance_s": uav.endurance_s,
-        }
-        for uav, short in zip(brief.uavs, shorts, strict=True)
-    ]
-    return json.dumps(
-        {
-            "type": "mission",
-            "name": name,
-            "horizon_s": brief.horizon_s,
-            "origin": brief.origin,
-            "bases": [
-                {
-                    "id": base.id,
-                    "position": base.position_enu_m,
-                    "swap_s": base.swap_s,
-                    "slots": base.slots,
-                }
-                for base in brief.bases
-            ],
-            "areas": [
-                {"id": area.id, "rings": [area.polygon_enu_m, *area.holes_enu_m]}
-                for area in brief.areas
-            ],
-            "zone_margin_m": brief.zone_margin_m,
-            "uavs": uavs,
-        },
-        allow_nan=False,
-    )
-
-
-def _choice_row(n: int, uav: str, choice: Choice) -> dict[str, object]:
-    return {
-        "n": n,
-        "id": f"{uav}-{choice.number}",
-        "uav": uav,
-        "task": choice.task,
-        "base": choice.base,
-        "why": visit_reason_in_words(choice),
-        "left": choice.left,
-        "mission_s": _rounded(choice.chosen_s, 3),
-        "rule": choice.rule,
-        "epoch": choice.epoch,
-        "rank": choice.rank,
-        "score": choice.score,
-        "second_score": choice.second_score,
-        "certificate": choice.certificate,
-        "completion_s": _rounded(choice.completion_s, 3),
-        "candidates": [{"task": each.task, "score": each.score} for each in choice.candidates],
-    }
-
-
-def _point(place: tuple[float, float, float] | None) -> list[float] | None:
-    return None if place is None else [round(each, 3) for each in place]
-
-
-def _rounded(value: float | None, digits: int) -> float | None:
-    return None if value is None else round(value, digits)
+            self._zones.put(row, self.seq)

@@ -47,8 +47,10 @@ class UavState:
     """`StatusPhase`, or lost, or starting, as it was last known."""
     task: TaskId | None
     """The one it has taken, as it was last known."""
+    completion_s: float | None
+    """Predicted completion of that task, or when it is ready at a base [s of mission]."""
     eta_s: float | None
-    """Predicted completion of that task, from now [s of mission]."""
+    """The same from now."""
     claim: ClaimPhase | None
     there: bool
     """Whether it is believed to be there."""
@@ -103,6 +105,11 @@ class UavState:
     def now_task(self) -> TaskId | None:
         """Its task; none where it is not there."""
         return self.task if self.there else None
+
+    @property
+    def now_completion_s(self) -> float | None:
+        """When its task is done; none where it is not there."""
+        return self.completion_s if self.there else None
 
     @property
     def now_eta_s(self) -> float | None:
@@ -181,16 +188,18 @@ class FleetStates:
         status, claim = mission_state.statuses.get(uav), mission_state.replica.claims.get(uav)
         heard_s = mission_state.heard_s.get(uav)
         does, task = _activity(mission_state, uav, status, claim)
-        eta_s = left_s = None
+        completion_s = eta_s = left_s = None
         if claim is not None and self._mission_s is not None:
             if task is not None or (claim.base is not None and claim.is_taken):
-                eta_s = claim.completion_s - self._mission_s
+                completion_s = claim.completion_s
+                eta_s = completion_s - self._mission_s
             if claim.sortie_end_s is not None:
                 left_s = max(0.0, claim.sortie_end_s - self._mission_s)
         return UavState(
             id=UavId(uav),
             does=does,
             task=task,
+            completion_s=completion_s,
             eta_s=eta_s,
             claim=None if claim is None else claim.phase,
             there=uav in mission_state.present,

@@ -3,7 +3,7 @@
 import { choiceDetails, concerns } from "./choices.js";
 import { uavColour } from "./colours.js";
 import { make } from "./dom.js";
-import { drawDoing, sortieLeft } from "./fleet.js";
+import { doneIn, drawDoing, sortieLeft } from "./fleet.js";
 import { degreesOf } from "./frames.js";
 import { reasons } from "./links.js";
 import { drawTaskState } from "./tasks.js";
@@ -112,7 +112,7 @@ export class Card {
     const task = picture.tasks.get(row.task);
     const facts = [
       ["Task", row.task ? this.#go("task", row.task) : NOTHING, row.task],
-      ["Done in", seconds(row.eta_s)],
+      ["Done in", seconds(doneIn(row, picture))],
       ["Claim", row.claim ?? NOTHING],
       ["Rank", rank < 0 ? NOTHING : `${rank + 1} of ${picture.head.sequence.length}`],
       ["Rule", picture.head?.rule ?? NOTHING],

@@ -38,8 +38,8 @@ export class FleetTable {
           id: "eta",
           title: "In",
           hint: "Until its task is done",
-          value: (row) => seconds(row.eta_s),
-          rank: (row) => row.eta_s,
+          value: (row) => seconds(doneIn(row, picture)),
+          rank: (row) => row.completion_s,
         },
         {
           id: "battery",
@@ -112,6 +112,12 @@ export function isTroubled(row) {
 
 function doing(row) {
   return row.lost ? "lost" : (row.visit ?? row.does);
+}
+
+/** Until the task of a UAV is done, as it predicts [s]; null where it has none. */
+export function doneIn(row, picture) {
+  const now = picture.head?.mission_s;
+  return row.completion_s === null || now === null || now === undefined ? null : row.completion_s - now;
 }
 
 /** For how long a UAV may fly on [s]; null where that is endless or not known. */

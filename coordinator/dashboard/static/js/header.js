@@ -46,7 +46,12 @@ export class Header {
     this.#tasks(head?.counts);
     const { now, so_far: soFar } = head?.nearest ?? {};
     setText(byId("figure-near"), now ? metres(now.distance_m) : NOTHING);
-    setText(byId("figure-nearest"), soFar ? `least ${metres(soFar.distance_m)}` : "");
+    const conflicts = head?.conflicts?.length ?? 0;
+    setText(
+      byId("figure-nearest"),
+      conflicts ? `${count(conflicts, "pair")} about to meet` : soFar ? `least ${metres(soFar.distance_m)}` : "",
+    );
+    setAttribute(byId("figure-nearest"), "class", conflicts ? "trouble" : null);
     byId("abort").hidden = !(hello?.commands && hello.kind === "live" && mission);
     byId("abort").disabled = Boolean(head?.aborted || head?.phase === "ended");
     this.showConnection();

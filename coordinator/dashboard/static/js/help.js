@@ -12,6 +12,7 @@ export const KEYS = [
   ["1 … 8", "open a tab"],
   ["f", "show the whole mission on the map"],
   ["l", "lists on the map: all, of the chosen UAV, none"],
+  ["h", "height layers on the map: all, or one after the other"],
   ["n", "new task: click its place, or move the map and press Enter"],
   ["z", "new zone: click its corners; Enter when all are there"],
   ["c", "bring what is chosen to the middle"],

@@ -132,6 +132,7 @@ const KEYS = {
   "/": () => finder.focus(),
   f: () => map.fit(),
   l: () => tools.nextLists(),
+  h: () => tools.nextLayer(),
   n: () => tools.place(),
   z: () => tools.draw(),
   c: () =>

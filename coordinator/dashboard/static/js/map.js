@@ -47,6 +47,8 @@ export class MissionMap {
     this.corners = [];
     this.selected = null;
     this.lists = null;
+    /** Index of the height layer that is shown alone; null: all are. */
+    this.layer = null;
     this.fitted = null;
     this.hint = container.appendChild(make("div", { class: "hint", hidden: true, "aria-hidden": "true" }));
     this.map.on("move zoom resize viewreset", () => this.#moved());
@@ -92,6 +94,12 @@ export class MissionMap {
   showLists(which) {
     this.lists = which;
     this.groundDirty = true;
+  }
+
+  /** Shows the UAVs of one height layer, by its index, and the others faintly; null shows all. */
+  showLayer(index) {
+    this.layer = index;
+    this.movingDirty = true;
   }
 
   /** Tasks that were asked for and that the feed does not show yet. */
@@ -222,6 +230,7 @@ export class MissionMap {
       mostValue: this.mostValue ?? 1,
       uavSize: this.uavSize,
       selected: this.selected,
+      layer: this.layer,
       ghosts: this.ghosts,
       corners: this.corners,
       showsList: (uav) => which === "all" || (which === "selected" && uav === this.selected),
@@ -265,7 +274,8 @@ export class MissionMap {
     if (kind === "uav") {
       const uav = this.picture.uavs.get(id);
       const goal = uav.task ?? uav.base;
-      return `${id} · ${uav.visit ?? uav.does}${goal ? ` → ${goal}` : ""}`;
+      const height = uav.height_m === null ? "" : ` · ${number(uav.height_m, 0)} m`;
+      return `${id} · ${uav.visit ?? uav.does}${goal ? ` → ${goal}` : ""}${height}`;
     }
     const task = this.picture.tasks.get(id);
     return `${id} · ${stateWord(taskState(task), task)}${task.uav ? ` · ${task.uav}` : ""} · value ${number(task.value)}`;

@@ -1,6 +1,8 @@
 // The buttons on the map, and the mode in which the next click says where a new task is.
 
 import { byId, make, setAttribute, setText } from "./dom.js";
+import { countByLayer } from "./layers.js";
+import { number } from "./words.js";
 
 const LISTS = ["all", "selected", "none"];
 
@@ -28,6 +30,9 @@ export class MapTools {
       id: "add-zone",
     });
     this.lists = button("Lists", "Planned and flown lists on the map", "l", () => this.nextLists());
+    this.layer = button("Layers", "Height layers on the map: all, or one after the other", "h", () =>
+      this.nextLayer(),
+    );
     this.ground = button(
       "Earth",
       "Map of the earth, or the mission's plane in metres",
@@ -39,6 +44,7 @@ export class MapTools {
       this.add,
       this.zone,
       this.lists,
+      this.layer,
       this.ground,
       button("Fit", "Show the whole mission", "f", () => map.fit()),
       make(
@@ -70,6 +76,7 @@ export class MapTools {
       this.lists,
       { all: "Lists: all", selected: "Lists: chosen", none: "Lists: none" }[this.map.listsShown],
     );
+    this.#layers();
     this.#legend();
   }
 
@@ -125,6 +132,28 @@ export class MapTools {
   nextLists() {
     this.map.showLists(LISTS[(LISTS.indexOf(this.map.listsShown) + 1) % LISTS.length]);
     this.show();
+  }
+
+  /** Shows the lowest layer alone, then the next ones, then all again. */
+  nextLayer() {
+    const count = this.picture.mission?.layers_m?.length ?? 0;
+    if (count < 2) return;
+    const next = this.map.layer === null ? 0 : this.map.layer + 1;
+    this.map.showLayer(next < count ? next : null);
+    this.show();
+  }
+
+  #layers() {
+    const layers = this.picture.mission?.layers_m ?? [];
+    this.layer.hidden = layers.length < 2;
+    if (this.map.layer !== null && this.map.layer >= layers.length) this.map.showLayer(null);
+    if (this.layer.hidden) return;
+    const { layer } = this.map;
+    const text =
+      layer === null
+        ? `Layers: all ${layers.length}`
+        : `Layer: ${number(layers[layer], 0)} m, ${countByLayer(this.picture.uavs.values(), layers)[layer]}`;
+    setText(this.layer, text);
   }
 
   /** Shows where the pointer is. */

@@ -1,9 +1,14 @@
 // Drawing the mission on two canvases: what changes with frames below, what moves above.
 
 import { uavColour } from "./colours.js";
-import { metres, taskState } from "./words.js";
+import { paintConflicts, paintNearest } from "./encounters.js";
+import { layerOf } from "./layers.js";
+import { arrow, bars, cross, disc, label, line, path, ring, tick } from "./strokes.js";
+import { taskState } from "./words.js";
 
 const WIDE = 2 * Math.PI;
+/** How visible a UAV is that flies in another layer than the one that is shown. */
+const FAINT = 0.18;
 /** Radius of the first point of a line [px]. */
 const LINE_END = 3.5;
 /** From so many tasks on lines have no names, but for the one that is selected. */
@@ -364,6 +369,8 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
   spots.clear();
   canvas.font = `600 11px ${look.ink.font}`;
   canvas.textAlign = "left";
+  const layers = picture.mission?.layers_m ?? [];
+  const inLayer = (row) => look.layer === null || layerOf(row, layers) === look.layer;
   for (const [id, { at }] of motion.shown) {
     const row = picture.uavs.get(id);
     const spot = view.spot(at);
@@ -371,6 +378,7 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
     spots.set(id, spot);
     canvas.strokeStyle = uavColour(picture.described(id).number, look.ink.dark);
     canvas.lineWidth = look.selected === id ? 2 : 1.25;
+    canvas.globalAlpha = inLayer(row) ? 1 : FAINT;
     const leg = picture.lists.get(id)?.ways?.leg;
     if (leg?.length && !row.lost) path(canvas, view, [at, ...leg.slice(1 + lastPassed(leg, at))]);
     const target = row.task && !row.lost && !leg ? picture.tasks.get(row.task) : null;
@@ -378,38 +386,21 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
     const [x, y] = view.spot(target.position);
     line(canvas, spot[0], spot[1], x, y);
   }
+  canvas.globalAlpha = 1;
   paintNearest(canvas, view, picture, motion, look);
   const labels = [];
   for (const [id, spot] of spots) {
-    if (view.holds(spot))
-      labels.push(paintUav(canvas, picture, motion.shown.get(id), picture.uavs.get(id), spot, look));
+    if (!view.holds(spot)) continue;
+    const row = picture.uavs.get(id);
+    const shown = inLayer(row);
+    canvas.globalAlpha = shown ? 1 : FAINT;
+    const name = paintUav(canvas, picture, motion.shown.get(id), row, spot, look);
+    if (shown || name.weight > 0) labels.push(name);
   }
+  canvas.globalAlpha = 1;
   paintLabels(canvas, labels, look, 1);
+  paintConflicts(canvas, view, picture, motion, look);
   for (const ghost of look.ghosts) paintGhost(canvas, view.spot(ghost.position), ghost.label, look);
-}
-
-/** The two UAVs that are nearest to each other now, and where two have been nearest so far. */
-function paintNearest(canvas, view, picture, motion, look) {
-  const { now, so_far: soFar } = picture.head?.nearest ?? {};
-  const { ink } = look;
-  if (soFar) {
-    const [[x, y], [otherX, otherY]] = soFar.places.map((position) => view.spot(position));
-    canvas.strokeStyle = ink.muted;
-    canvas.lineWidth = 1.5;
-    cross(canvas, (x + otherX) / 2, (y + otherY) / 2, 4);
-    const text = `least ${metres(soFar.distance_m)}`;
-    label(canvas, text, (x + otherX) / 2 + 8, (y + otherY) / 2 - 6, ink.muted, look);
-  }
-  if (!now) return;
-  const [one, other] = now.uavs.map((id) => motion.shown.get(id)?.at);
-  if (!one || !other) return;
-  const [[x, y], [otherX, otherY]] = [one, other].map((position) => view.spot(position));
-  canvas.strokeStyle = ink.text;
-  canvas.lineWidth = 1.5;
-  canvas.setLineDash([2, 3]);
-  line(canvas, x, y, otherX, otherY);
-  canvas.setLineDash([]);
-  label(canvas, metres(now.distance_m), (x + otherX) / 2 + 8, (y + otherY) / 2 + 16, ink.text, look);
 }
 
 function paintUav(canvas, picture, motion, row, [x, y], look) {
@@ -484,83 +475,4 @@ function paintGhost(canvas, [x, y], text, look) {
   canvas.stroke();
   canvas.setLineDash([]);
   label(canvas, text, x + 13, y + 4, look.ink.accent, look);
-}
-
-function path(canvas, view, positions) {
-  canvas.beginPath();
-  positions.forEach((position, index) => {
-    const [x, y] = view.spot(position);
-    if (index) canvas.lineTo(x, y);
-    else canvas.moveTo(x, y);
-  });
-  canvas.stroke();
-}
-
-function line(canvas, fromX, fromY, toX, toY) {
-  canvas.beginPath();
-  canvas.moveTo(fromX, fromY);
-  canvas.lineTo(toX, toY);
-  canvas.stroke();
-}
-
-function disc(canvas, x, y, radius) {
-  canvas.beginPath();
-  canvas.arc(x, y, radius, 0, WIDE);
-  canvas.fill();
-  canvas.stroke();
-}
-
-function ring(canvas, x, y, radius, colour) {
-  canvas.strokeStyle = colour;
-  canvas.lineWidth = 2;
-  canvas.beginPath();
-  canvas.arc(x, y, radius, 0, WIDE);
-  canvas.stroke();
-}
-
-function tick(canvas, x, y, radius, colour) {
-  canvas.strokeStyle = colour;
-  canvas.lineWidth = 1.75;
-  canvas.beginPath();
-  canvas.moveTo(x - radius * 0.45, y + radius * 0.05);
-  canvas.lineTo(x - radius * 0.1, y + radius * 0.4);
-  canvas.lineTo(x + radius * 0.5, y - radius * 0.4);
-  canvas.stroke();
-}
-
-function cross(canvas, x, y, half) {
-  canvas.beginPath();
-  canvas.moveTo(x - half, y - half);
-  canvas.lineTo(x + half, y + half);
-  canvas.moveTo(x + half, y - half);
-  canvas.lineTo(x - half, y + half);
-  canvas.stroke();
-}
-
-function arrow(canvas, size, heading) {
-  const turned = (across, ahead) => [
-    across * Math.cos(heading) + ahead * Math.sin(heading),
-    across * Math.sin(heading) - ahead * Math.cos(heading),
-  ];
-  canvas.beginPath();
-  canvas.moveTo(...turned(0, size));
-  canvas.lineTo(...turned(0.75 * size, -0.8 * size));
-  canvas.lineTo(...turned(0, -0.4 * size));
-  canvas.lineTo(...turned(-0.75 * size, -0.8 * size));
-  canvas.closePath();
-}
-
-function bars(canvas, size, ink) {
-  canvas.fillStyle = ink.text;
-  canvas.fillRect(-size - 7, -5, 3, 10);
-  canvas.fillRect(-size - 2, -5, 3, 10);
-}
-
-function label(canvas, text, x, y, colour, look) {
-  canvas.lineJoin = "round";
-  canvas.lineWidth = 3;
-  canvas.strokeStyle = look.ink.ground;
-  canvas.strokeText(text, x, y);
-  canvas.fillStyle = colour;
-  canvas.fillText(text, x, y);
 }

@@ -43,8 +43,6 @@ export class Picture {
     this.story = [];
     this.choices = [];
     this.curve = [];
-    /** Mission time at which each UAV's row came, for those who draw it between frames. */
-    this.toldAt = new Map();
     this.inOrder = null;
   }
 
@@ -97,33 +95,27 @@ export class Picture {
     if (frame.whole) this.forget();
     const { uavs, tasks, lists, zones, commands, story, choices, objective_curve: curve, ...head } = frame;
     this.head = head;
-    for (const row of uavs ?? []) {
-      this.uavs.set(row.id, row);
-      this.toldAt.set(row.id, frame.mission_s);
-      changed.uavs.add(row.id);
-    }
-    for (const row of tasks ?? []) {
-      this.tasks.set(row.id, row);
-      changed.tasks.add(row.id);
-    }
-    for (const row of lists ?? []) {
-      this.lists.set(row.uav, row);
-      changed.lists.add(row.uav);
-    }
-    for (const row of zones ?? []) {
-      this.zones.set(row.id, row);
-      changed.zones.add(row.id);
-    }
-    for (const row of commands ?? []) {
-      this.commands.set(row.n, row);
-      changed.commands.add(row.n);
-    }
+    changed.uavs = merge(this.uavs, uavs, "id");
+    changed.tasks = merge(this.tasks, tasks, "id");
+    changed.lists = merge(this.lists, lists, "uav");
+    changed.zones = merge(this.zones, zones, "id");
+    changed.commands = merge(this.commands, commands, "n");
     changed.story = grow(this.story, story, STORY_LINES);
     changed.choices = grow(this.choices, choices, CHOICES);
     this.curve.push(...(curve ?? []));
     if (this.curve.length > 2 * CURVE_POINTS) this.curve = thinned(this.curve);
     return changed;
   }
+}
+
+/** Takes in rows, of which only the fields that have changed are told; the keys of those. */
+function merge(known, rows, key) {
+  const changed = new Set();
+  for (const row of rows ?? []) {
+    known.set(row[key], { ...known.get(row[key]), ...row });
+    changed.add(row[key]);
+  }
+  return changed;
 }
 
 /** Appends what is new by its number `n`; keeps the newest. */

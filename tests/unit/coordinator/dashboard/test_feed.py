@@ -15,7 +15,14 @@ from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import MessageReceived
 from swarm.protocol.field_messages import AreaSpec
 from swarm.protocol.messages import Message, MissionPhase, Stamp
-from swarm.protocol.uav_messages import AttemptResult, Candidate, Choice, ChoiceBasis, StatusPhase
+from swarm.protocol.uav_messages import (
+    AttemptResult,
+    Candidate,
+    Choice,
+    ChoiceBasis,
+    Status,
+    StatusPhase,
+)
 from tests.support.builders import MISSION, OUT, brief, epoch, uav
 from tests.support.desk_play import DeskPlay, FakePlayer
 
@@ -39,7 +46,9 @@ class Page:
         before = {name: {} if whole else self.picture[name] for name in KEYS}
         told = {name: [] if whole else self.picture[name] for name in LOGS}
         self.picture = frame
-        self.picture |= {name: before[name] | rows[name] for name in KEYS}
+        for name in KEYS:
+            changed = {key: before[name].get(key, {}) | row for key, row in rows[name].items()}
+            self.picture[name] = before[name] | changed
         self.picture |= {name: told[name] + logs[name] for name in LOGS}
         self.seen = self.feed.seq
         return {"whole": whole, **self.picture}
@@ -91,7 +100,12 @@ def test_a_whole_frame_tells_everything() -> None:
         "withdrawn": 0,
     }
     u1 = picture["uavs"]["u1"]
-    assert (u1["does"], u1["task"], u1["claim"], u1["eta_s"]) == ("flying", "t1", "held", 6.0)
+    assert (u1["does"], u1["task"], u1["claim"], u1["completion_s"]) == (
+        "flying",
+        "t1",
+        "held",
+        10.0,
+    )
     assert (u1["position"], u1["battery"], u1["present"]) == ([3.0, 0.0, 0.0], 0.5, True)
     assert (u1["silent_s"], u1["dropped"]) == (4.0, {"stale": 2})
     t2 = picture["tasks"]["t2"]
@@ -171,6 +185,47 @@ def test_a_growing_silence_is_told_now_and_then() -> None:
         told += [row["silent_s"] for row in frame["uavs"] if row["id"] == "u1"]
 
     assert told == [0.0, 2.5, 5.0]
+
+
+def test_of_a_row_only_what_has_changed_is_told() -> None:
+    play = DeskPlay()
+    play.begin()
+    play.status("u1", StatusPhase.FLYING, east_m=3.0)
+    feed = feed_of(play)
+    feed.look()
+    before = feed.seq
+    play.status("u1", StatusPhase.FLYING, east_m=4.0)
+    feed.look()
+    between = feed.seq
+    play.claim("u1", "t1")
+    feed.look()
+
+    (since_claim,) = json.loads(feed.frame(between))["uavs"]
+    (since_before,) = json.loads(feed.frame(before))["uavs"]
+
+    claimed = {"does": "flying", "task": "t1", "claim": "held", "completion_s": 10.0}
+    assert since_claim == {"id": "u1"} | claimed
+    assert since_before == since_claim | {"position": [4.0, 0.0, 0.0]}
+
+
+def test_who_would_come_too_near_is_told() -> None:
+    play = DeskPlay()
+    play.begin()
+    apart = replace(brief(uav("u1"), uav("u2")), separation_m=10.0)
+    play.say(COORDINATOR, apart)
+    for who, east_m, speed_m_s in (("u1", 0.0, 1.0), ("u2", 15.0, -1.0)):
+        place, velocity = (east_m, 0.0, 30.0), (speed_m_s, 0.0, 0.0)
+        play.say(who, Status(StatusPhase.FLYING, None, place, velocity, None, 0.0, {}, ""))
+    feed = feed_of(play)
+    feed.look()
+
+    (conflict,) = json.loads(feed.frame(None))["conflicts"]
+
+    assert feed.mission is not None
+    assert json.loads(feed.mission)["separation_m"] == 10.0
+    assert json.loads(feed.mission)["layers_m"] == [10.0, 22.0]
+    assert conflict["uavs"] == ["u1", "u2"]
+    assert conflict["distance_m"] < 10.0
 
 
 def test_clients_in_step_share_one_text() -> None:
