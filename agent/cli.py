@@ -25,6 +25,7 @@ from swarm.runtime.options import (
 if TYPE_CHECKING:
     from agent.core.agent_core import AgentCore
     from agent.core.interface import VehicleReport
+    from agent.core.station_words import StationAsked
     from agent.runner import MakeVehicle, Vehicle
     from swarm.bus.config import BusConfig
     from swarm.identity import Identity
@@ -100,11 +101,20 @@ def agent(
         typer.Option(
             "--forward",
             metavar="URL",
-            help="Show the vehicle to a ground station at udp:HOST:PORT, which cannot command "
-            "it there; may be repeated.",
+            help="Show the vehicle, and what its UAV does, to a ground station at "
+            "udp:HOST:PORT, which cannot command the vehicle there; may be repeated.",
             show_default=False,
         ),
     ] = None,
+    station_actions: Annotated[
+        bool,
+        typer.Option(
+            "--station-actions",
+            help="Let these ground stations hold the UAV, let it go on or start again from a "
+            "base, send it home and abort (MAV_CMD_USER_1 to 5). Beyond this machine only with "
+            "--signing-key, and only if they sign.",
+        ),
+    ] = False,
     command: Annotated[
         CommandStyle,
         typer.Option(
@@ -212,10 +222,11 @@ def agent(
       --keys keys/quad-2 --connect tls/192.168.1.2:7447 --state /var/lib/peckorder
     """
     from agent.core.agent_core import AgentCore
+    from agent.core.ground_station import CONFIRM_S
     from agent.core.path_clearance import PATH_CLEARANCE_M
     from agent.core.verticals import Verticals
     from agent.links.mavlink_vehicle import MavlinkVehicle
-    from agent.vehicle.config import BridgeConfig, status_rate_for
+    from agent.vehicle.config import BridgeConfig, check_station_actions, status_rate_for
     from agent.vehicle.signing import load_signing_key
     from swarm.identity import Role
     from swarm.model import Origin
@@ -230,6 +241,8 @@ def agent(
     network = seat.network
     config = seat.config(mission=mission, roles=(Role.UAV,), name=uav)
     _check_links(mavlink, forward or ())
+    if station_actions:
+        check_station_actions(forward or (), signed=signing_key is not None)
     own_system_id, own_component_id = _ground_ids(ground_id)
     key = None if signing_key is None else load_signing_key(signing_key)
     if check:
@@ -237,7 +250,9 @@ def agent(
     if config.identity is not None and key is None:
         _tell_unsigned(uav, config.identity)
 
-    def vehicle(brief: MissionConfig, report: Callable[[VehicleReport], None]) -> Vehicle:
+    def vehicle(
+        brief: MissionConfig, report: Callable[[VehicleReport | StationAsked], None]
+    ) -> Vehicle:
         settings = BridgeConfig(
             system_id=system_id,
             origin=Origin(*brief.origin),
@@ -257,7 +272,15 @@ def agent(
             fence_radius_m=fence_radius_m,
             fence_height_m=fence_height_m,
         ).for_speedup(speedup)
-        return MavlinkVehicle(settings, mavlink, clock, report, key=key, forward=forward or ())
+        return MavlinkVehicle(
+            settings,
+            mavlink,
+            clock,
+            report,
+            key=key,
+            forward=forward or (),
+            heeds_stations=station_actions,
+        )
 
     def core(memory: Memory | None) -> AgentCore:
         return AgentCore(
@@ -271,6 +294,8 @@ def agent(
             without_bus_s=None if without_bus_s is None else without_bus_s * speedup,
             path_clearance_m=PATH_CLEARANCE_M,
             verticals=Verticals(),
+            shows_stations=bool(forward),
+            confirm_s=CONFIRM_S * speedup,
         )
 
     clock = ScaledClock(speedup)

@@ -26,6 +26,7 @@ from agent.core.interface import (
     VehicleOrder,
     VehicleReport,
 )
+from agent.core.station_words import StationAction, StationAsked
 from swarm.bus.port import Bus
 from swarm.protocol.events import Stop
 from swarm.protocol.messages import MissionConfig, Snapshot
@@ -61,13 +62,18 @@ class Vehicle(Protocol):
         """Command it."""
         ...
 
+    def tell_stations(self, action: StationAction) -> None:
+        """Tell the ground stations that are shown it."""
+        ...
+
     async def close(self) -> None:
         """Close the link; the vehicle goes on with what it does."""
         ...
 
 
-MakeVehicle = Callable[[MissionConfig, Callable[[VehicleReport], None]], Vehicle]
-"""Makes the vehicle for a mission, with a callback for its reports."""
+MakeVehicle = Callable[[MissionConfig, Callable[[VehicleReport | StationAsked], None]], Vehicle]
+"""Makes the vehicle for a mission, with a callback for its reports, and for what ground stations
+that are shown it ask for."""
 
 
 class _Dropping(Protocol):
@@ -275,6 +281,8 @@ class _Flight:
         core.dropped = _Dropped(self.shell)
 
     def _execute(self, action: Action) -> None:
+        if isinstance(action, StationAction) and self.vehicle is not None:
+            self.vehicle.tell_stations(action)
         if not isinstance(action, OrderVehicle):
             return
         brief, order = self._core.replica.brief, action.order
@@ -291,7 +299,7 @@ class _Flight:
         elif isinstance(order, Return):
             asyncio.get_running_loop().call_soon(self._report, Home())
 
-    def _report(self, news: VehicleReport) -> None:
+    def _report(self, news: VehicleReport | StationAsked) -> None:
         if isinstance(news, ReturnBegun):
             self.returns.set()
         if not isinstance(news, Telemetry):  # most of all, what the next task is may follow

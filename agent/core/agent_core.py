@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from agent.core.announcer import Announcer
 from agent.core.context import AgentContext, AgentPart
 from agent.core.field_tasking import FieldTasking
+from agent.core.ground_station import CONFIRM_S, HELD_BEFORE, GroundStation, was_held
 from agent.core.interface import (
     Action,
     Event,
@@ -35,6 +36,7 @@ from agent.core.states import (
     AgentStateMachine,
     Trigger,
 )
+from agent.core.station_words import StationAsked
 from agent.core.stop_conditions import BusLossTimer, EndCondition, OperatorCommands
 from agent.core.told_zones import ToldZones
 from agent.core.vehicle_commander import VehicleCommander
@@ -99,6 +101,8 @@ class AgentCore(AgentPart):
         make_rule: what it decides by in an epoch of that rule and those routes. Every UAV of a
             fleet needs the same.
         make_field_rule: the same where the field's constraints count.
+        shows_stations: whether there are ground stations to be shown what it does.
+        confirm_s: how long an abort that a ground station asked for may be confirmed.
     """
 
     def __init__(
@@ -116,6 +120,8 @@ class AgentCore(AgentPart):
         path_clearance_m: float = 0.0,
         verticals: Verticals | None = None,
         make_field_rule: FieldRuleMaker = usual_field_rule,
+        shows_stations: bool = False,
+        confirm_s: float = CONFIRM_S,
     ) -> None:
         self.uav = uav
         self.replica = Replica()
@@ -143,6 +149,9 @@ class AgentCore(AgentPart):
         self._near_traffic.when_disturbed = self._tasking.disturbed
         self._ending = EndCondition(context)
         self._commander = VehicleCommander(context, self._tasking, self._ending)
+        self._station = GroundStation(
+            context, self._tasking, self._commander, confirm_s=confirm_s, shown=shows_stations
+        )
         self._sync = StateSync(context, self._tasking)
         self._queries = self._sync.queries
         self._recovered = RecoveredState(uav, memory, memory_age_s, timing)
@@ -285,6 +294,8 @@ class AgentCore(AgentPart):
                 self._commander.go_home(reason, now_s, hurry=True)
             case Tick():
                 pass
+            case StationAsked():
+                self._station.hear(event, now_s)
             case report:
                 self._commander.hear(report, now_s)
 
@@ -390,6 +401,9 @@ class AgentCore(AgentPart):
                 self._announcer.explain(waits)
                 self._log(waits, uav=self.uav)
             return
+        if was_held(self.replica, self.uav, self._recovered.taken) and not self._rejoin:
+            self._commander.hold(HELD_BEFORE, now_s)
+            return
         claim = self.replica.claims.get(self.uav)
         if claim is not None and self._mission_view.said_to_run and self._tasking.stand(now_s):
             return
@@ -472,6 +486,7 @@ class AgentCore(AgentPart):
 
     def _end_step(self, now_s: float) -> list[Action]:
         """What came of the step; a change worth it is kept for a later life."""
+        self._station.show(now_s)
         actions = self._actions.copy()
         self._actions.clear()
         self._told_zones.tell(actions)

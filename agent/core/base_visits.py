@@ -360,8 +360,15 @@ class BaseVisits(AgentPart):
         word = readiness(self._replica).get(self._uav)
         if word is not None and word != self._word:
             self._word = word
-            self._flights.let_start()
-            self._log("may start again")
+            self.let_start()
+
+    def let_start(self) -> bool:
+        """Pass on that it may start again; whether it stands on a slot to do so."""
+        if self._machine.state is not AgentState.SWAPPING:
+            return False
+        self._flights.let_start()
+        self._log("may start again")
+        return True
 
     def _wait_on_ground(self, base: BaseSpec, now_s: float) -> None:
         if not self.is_blocked(base):

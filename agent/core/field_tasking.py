@@ -125,6 +125,10 @@ class FieldTasking(Tasking):
         """The vehicle has a full battery."""
         self._visits.swapped(leg, now_s)
 
+    def let_start(self) -> bool:
+        """Somebody has seen to the vehicle; whether it stands on a slot and is told so."""
+        return self._visits.let_start()
+
     def refuse(self, leg: int, reason: str, now_s: float, *, passes: bool = False) -> None:
         """The vehicle will not fly that leg, or not land: leave its aim alone for a while."""
         if leg != self._flights.leg:

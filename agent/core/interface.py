@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from agent.core.station_words import StationAction, StationAsked
 from swarm.model import Zone
 from swarm.protocol.events import CommonAction, CommonEvent, MessagesReceived
 
@@ -326,6 +327,6 @@ class OrderVehicle:
     order: VehicleOrder
 
 
-Event = CommonEvent | MessagesReceived | VehicleReport
+Event = CommonEvent | MessagesReceived | VehicleReport | StationAsked
 
-Action = CommonAction | OrderVehicle
+Action = CommonAction | OrderVehicle | StationAction

@@ -30,6 +30,8 @@ class RecoveredState:
     def __init__(self, uav: str, memory: Snapshot | None, age_s: float, timing: Timing) -> None:
         self.unconfirmed = False
         """Whether it was taken because nobody came who knows better."""
+        self.taken: Replica | None = None
+        """What the earlier life knew, once it counts."""
         self._memory = memory
         self._known = Replica()
         self._known.join_all(() if memory is None else memory.messages)
@@ -75,6 +77,7 @@ class RecoveredState:
 
     def _take(self, counts: bool) -> Snapshot | None:
         memory, self._memory = self._memory, None
+        self.taken = self._known if counts else None
         return memory if counts else None
 
 

@@ -142,7 +142,7 @@ class Tasking(AgentPart, ABC):
         task = self._task()
         self._withdraw(ClaimPhase.PAUSED, now_s, handed_over=False)
         if task is not None:
-            self._note("released", task.task, reason="the operator holds the UAV")
+            self._note("released", task.task, reason="the UAV is held")
 
     def wake(self, now_s: float) -> None:
         """Decide anew when free; who found nothing before takes no precedence from that."""

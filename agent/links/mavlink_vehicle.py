@@ -1,22 +1,23 @@
 """The bridge with a link and a clock: the only place of it where time passes.
 
 Everything happens in the loop's thread and without waiting: an order is on its way to the autopilot
-before `order` returns. Ground stations may be shown the vehicle, one way only: its frames as they
-came, one datagram each. Two who command one vehicle undo each other's orders, so what they say is
-not read.
+before `order` returns. Ground stations may be shown the vehicle: its frames as they came. Two who
+command one vehicle undo each other's orders, so nothing that they say is passed on to it.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Mapping, Sequence
 
 from agent.core.interface import HandedOver, VehicleOrder, VehicleReport
+from agent.core.station_words import StationAction, StationAsked
 from agent.links.link import ByteLink, open_link
+from agent.links.station_links import StationLinks
 from agent.links.vehicle_clock import VehicleClock
 from agent.vehicle.bridge import Bridge
-from agent.vehicle.config import BridgeConfig, UdpOutAddress, parse_forward, parse_link
+from agent.vehicle.config import BridgeConfig, parse_forward, parse_link
 from agent.vehicle.conversation import SendBytes
 from agent.vehicle.session import BridgeEvent, BytesReceived, LinkClosed, LinkOpened, TimePassed
 from agent.vehicle.signing import Signing, SigningKey
@@ -44,10 +45,11 @@ class MavlinkVehicle:
         config: how to treat it.
         url: where the autopilot is; see `agent.links.link`.
         clock: vehicle time; a scaled one when the vehicle is simulated faster.
-        on_report: hears every report, in order, in the loop's thread. It may give
-            orders from inside the call.
+        on_report: hears every report, in order, in the loop's thread, and what ground stations
+            ask of the UAV. It may give orders from inside the call.
         key: shared with the autopilot: everything is signed, nothing unsigned believed.
         forward: URLs of ground stations that are shown the vehicle.
+        heeds_stations: whether these may ask anything of the UAV.
 
     Raises:
         InputError: a URL is wrong, or this machine cannot open such a link.
@@ -58,16 +60,24 @@ class MavlinkVehicle:
         config: BridgeConfig,
         url: str,
         clock: Clock,
-        on_report: Callable[[VehicleReport], None],
+        on_report: Callable[[VehicleReport | StationAsked], None],
         *,
         key: SigningKey | None = None,
         forward: Sequence[str] = (),
+        heeds_stations: bool = False,
     ) -> None:
         self.bridge = Bridge(config, None if key is None else Signing(key, unix_s))
         redial_s = clock.wall_delay_s(_REDIAL_TIMEOUTS * config.silence_timeout_s)
         self.link: ByteLink = open_link(parse_link(url), self, silence_s=redial_s)
-        self._forwarding = FrameForwarder([parse_forward(each) for each in forward])
-        self.bridge.codec.keep_frames = bool(self._forwarding)
+        self._stations = StationLinks(
+            map(parse_forward, forward),
+            config.system_id,
+            clock,
+            on_report,
+            key=key,
+            heeds=heeds_stations,
+        )
+        self.bridge.codec.keep_frames = bool(self._stations)
         self._log = get_logger(__name__, link=self.link.url)
         self._told_dropped: set[str] = set()
         self._told_unchecked = False
@@ -84,7 +94,7 @@ class MavlinkVehicle:
     async def start(self) -> None:
         """Open the link and go to work, in the running loop."""
         self.link.start()
-        self._forwarding.start()
+        self._stations.start()
         self._happen(TimePassed())
 
     @property
@@ -92,7 +102,8 @@ class MavlinkVehicle:
         """What was dropped so far, by reason: frames, and parameters."""
         dropped = self._disbelieved()
         dropped["absurd parameters"] = self.bridge.absurd_parameters
-        dropped["not forwarded"] = self._forwarding.dropped
+        dropped["not forwarded"] = self._stations.dropped
+        dropped["from ground stations"] = self._stations.distrusted
         return +dropped
 
     def _disbelieved(self) -> Counter[str]:
@@ -105,6 +116,10 @@ class MavlinkVehicle:
         """Give the vehicle an order; what comes of it is reported."""
         self._happen(order)
 
+    def tell_stations(self, action: StationAction) -> None:
+        """Tell the ground stations that are shown the vehicle."""
+        self._stations.tell(action)
+
     async def close(self) -> None:
         """Leave the vehicle as it is and close the link; closing twice is fine."""
         self._closed = True
@@ -112,7 +127,7 @@ class MavlinkVehicle:
             self._timer.cancel()
             self._timer = None
         await self.link.close()
-        await self._forwarding.close()
+        await self._stations.close()
         self._tell_turnarounds()
         if (frac := self._vehicle_clock.frac) is not None:
             self._log.info(CLOCK, clock_frac=round(frac, 4))
@@ -131,7 +146,7 @@ class MavlinkVehicle:
         self._happen(BytesReceived(data, source))
         if (boot_s := self.bridge.boot_s) is not None:
             self._vehicle_clock.note(boot_s, self._clock.now_s())
-        self._forwarding.show(self.bridge.codec.take_frames())
+        self._stations.show(self.bridge.codec.take_frames())
         self._tell_of_dropped()
 
     def _tell_of_dropped(self) -> None:
@@ -213,47 +228,3 @@ class MavlinkVehicle:
     def _ring(self) -> None:
         self._timer = None
         self._happen(TimePassed())
-
-
-class FrameForwarder:
-    """Ground stations that watch one vehicle. Close it in ``finally``."""
-
-    def __init__(self, addresses: Iterable[UdpOutAddress]) -> None:
-        self._links = [open_link(address, _Deaf()) for address in addresses]
-
-    def __bool__(self) -> bool:
-        return bool(self._links)
-
-    @property
-    def dropped(self) -> int:
-        """Frames that did not reach the network, or that it refused."""
-        return sum(link.counts.unsent for link in self._links)
-
-    def start(self) -> None:
-        """Open the sockets, in the running loop."""
-        for link in self._links:
-            link.start()
-
-    def show(self, frames: Iterable[bytes]) -> None:
-        """Send every frame to everybody."""
-        for frame in frames:
-            for link in self._links:
-                link.send(frame)
-
-    async def close(self) -> None:
-        """Close the sockets; closing twice is fine."""
-        for link in self._links:
-            await link.close()
-
-
-class _Deaf:
-    """Takes no notice of a link."""
-
-    def link_up(self) -> None:
-        pass
-
-    def link_down(self) -> None:
-        pass
-
-    def received(self, data: bytes, source: Hashable | None = None) -> None:
-        pass

@@ -10,6 +10,7 @@ from enum import StrEnum
 from typing import ClassVar
 
 from agent.vehicle.commands import CommandPolicy
+from swarm.bus.config import is_loopback
 from swarm.model import Zone
 from swarm.model.frames import Origin
 from swarm.model.terrain import Terrain
@@ -297,6 +298,30 @@ def parse_forward(url: str, source: str = "--forward") -> UdpOutAddress:
     """
     _, place, value = _parts(url, ("udp",), source, _FORWARD_REMEDY)
     return UdpOutAddress(_host(url, place, value, source, _FORWARD_REMEDY), value)
+
+
+def check_station_actions(
+    forward: Collection[str], *, signed: bool, source: str = "--station-actions"
+) -> None:
+    """Refuse to heed ground stations that anybody could pass for.
+
+    Args:
+        forward: URLs of ground stations, checked by `parse_forward`.
+        signed: whether only what is signed is heeded.
+        source: what asks for it, for the message.
+
+    Raises:
+        InputError: there is no ground station, or one is on another machine and signs nothing.
+    """
+    if not forward:
+        problem = "there is no ground station whose actions could be taken"
+        raise InputError(Fault(source, "", problem, "name one: --forward udp:HOST:PORT"))
+    for url in forward:
+        address = parse_forward(url)
+        if not (signed or is_loopback(f"udp/{address.host}:{address.port}")):
+            problem = "anybody on that network could pass for this ground station"
+            remedy = "give --signing-key, or a ground station on this machine"
+            raise InputError(Fault(source, url, problem, remedy))
 
 
 def _parts(url: str, schemes: Collection[str], source: str, remedy: str) -> tuple[str, str, int]:

@@ -90,6 +90,14 @@ def run(
             "be repeated.",
         ),
     ] = None,
+    station_actions: Annotated[
+        bool,
+        typer.Option(
+            "--station-actions",
+            help="Let these ground stations hold UAVs, let them go on, send them home and abort. "
+            "See swarm agent.",
+        ),
+    ] = False,
     signing_key: Annotated[
         Path | None,
         typer.Option(
@@ -296,6 +304,7 @@ def run(
     passthrough = PassthroughOptions(
         command=parse_command_styles(command, uavs),
         forward=tuple(forward or ()),
+        station_actions=station_actions,
         signing_key=signing_key,
         battery_reserve=battery_reserve,
         keep_jerk=keep_jerk,

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from agent.vehicle.config import CommandStyle, parse_forward
+from agent.vehicle.config import CommandStyle, check_station_actions, parse_forward
 from agent.vehicle.signing import load_signing_key, signing_key_of
 from sim.autopilot.options import faults_by_uav
 from sim.fleet.autopilots import Autopilots, SimulatedAutopilots
@@ -70,6 +70,8 @@ class PassthroughOptions:
     command: Mapping[str, CommandStyle] = field(default_factory=dict)
     """By UAV; the others get the default of `swarm agent`."""
     forward: tuple[str, ...] = ()
+    station_actions: bool = False
+    """Whether ground stations that are shown the vehicles may ask anything of the UAVs."""
     signing_key: Path | None = None
     """Of all vehicles, or a folder with each UAV's own."""
     battery_reserve: float | None = None
@@ -88,6 +90,7 @@ class PassthroughOptions:
         return [
             *([] if style is None else ["--command", style]),
             *(word for url in self.forward for word in ("--forward", url)),
+            *(["--station-actions"] if self.station_actions else []),
             *_given("--battery-reserve", self.battery_reserve),
             *(["--keep-jerk"] if self.keep_jerk else []),
             *([] if self.fence is None else self.fence.to_agent()),
@@ -151,6 +154,8 @@ def check_passthrough(
     """
     for url in passthrough.forward:
         parse_forward(url)
+    if passthrough.station_actions:
+        check_station_actions(passthrough.forward, signed=passthrough.signing_key is not None)
     if passthrough.signing_key is not None:
         for path in dict.fromkeys(signing_key_of(uav, passthrough.signing_key) for uav in uavs):
             load_signing_key(path)

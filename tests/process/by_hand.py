@@ -37,6 +37,7 @@ class ByHand:
             than for everybody.
         flavour: of the simulated autopilots.
         by_itself: whether their vehicles start again without anybody's word.
+        agent_options: more options of every agent.
     """
 
     def __init__(
@@ -50,6 +51,7 @@ class ByHand:
         *,
         flavour: str = "ardupilot",
         by_itself: bool = False,
+        agent_options: Sequence[str] = (),
     ) -> None:
         self.folder = folder
         self.mission = mission
@@ -71,6 +73,7 @@ class ByHand:
         listen = ["--listen", "tcp:127.0.0.1:0", *flown, "--json"]
         autopilot = ["autopilot", str(self._scenario), *chosen, *listen, "--flavour", flavour]
         self._by_itself = by_itself
+        self._agent_options = agent_options
         flying = self.start("autopilot", autopilot)
         self._vehicles = {
             str(said["uav"]): said for said in map(self._line, [flying] * len(self.uavs))
@@ -144,6 +147,7 @@ class ByHand:
         words = ["agent", "--mission", self.mission.name, "--uav", uav]
         words += ["--mavlink", str(vehicle["url"]), "--system-id", str(vehicle["system_id"])]
         words += ["--ready-by-itself"] if self._by_itself else []
+        words += self._agent_options
         return self.start(name or uav, [*words, *self.seat, *self.keys_of(uav)])
 
     @staticmethod

@@ -14,8 +14,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import VehicleReady, VehicleReport
-from agent.links.mavlink_vehicle import FrameForwarder, MavlinkVehicle
-from agent.vehicle.config import BridgeConfig, UdpOutAddress
+from agent.core.station_words import StationAsked
+from agent.links.mavlink_vehicle import MavlinkVehicle
+from agent.links.station_links import StationLinks
+from agent.vehicle.config import ONBOARD_COMPUTER, BridgeConfig, UdpOutAddress
 from agent.vehicle.signing import SigningKey
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.firmware.ardupilot import ArduCopterModel
@@ -39,6 +41,9 @@ class GroundStation(asyncio.DatagramProtocol):
 
     def __init__(self) -> None:
         self.datagrams: list[bytes] = []
+        """Of vehicles."""
+        self.beside: list[bytes] = []
+        """Of their agents."""
         self.senders: set[tuple[str, int]] = set()
         self._transport: asyncio.DatagramTransport | None = None
 
@@ -50,8 +55,11 @@ class GroundStation(asyncio.DatagramProtocol):
         return port
 
     def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
-        self.datagrams.append(data)
         self.senders.add(addr)
+        if data[0] == 0xFD and data[6] == ONBOARD_COMPUTER:  # what agents say themselves
+            self.beside.append(data)
+        else:
+            self.datagrams.append(data)
 
     def say(self, data: bytes) -> None:
         assert self._transport is not None
@@ -75,7 +83,7 @@ class GroundStation(asyncio.DatagramProtocol):
 @asynccontextmanager
 async def flown(
     system_id: int, forward: list[str], clock: ScaledClock, key: SigningKey | None = None
-) -> AsyncIterator[tuple[MavlinkVehicle, list[VehicleReport]]]:
+) -> AsyncIterator[tuple[MavlinkVehicle, list[VehicleReport | StationAsked]]]:
     """A simulated vehicle and its bridge, under way to its start."""
     machine = SimulatedAutopilot(
         VehicleConfig(system_id, origin=ORIGIN), ArduCopterModel(), clock.now_s()
@@ -84,7 +92,7 @@ async def flown(
     secret = None if key is None else key.secret
     server = VehicleServer(machine, endpoint, clock, signing_secret=secret)
     await server.start()
-    reports: list[VehicleReport] = []
+    reports: list[VehicleReport | StationAsked] = []
     config = replace(CONFIG, system_id=system_id)
     vehicle = MavlinkVehicle(config, server.url, clock, reports.append, key=key, forward=forward)
     try:
@@ -118,7 +126,9 @@ def test_two_vehicles_are_shown_to_one_ground_station_which_commands_neither(
         assert set(heard) == {3, 7}
         for names in heard.values():
             assert {"HEARTBEAT", "GLOBAL_POSITION_INT", "COMMAND_ACK"} <= names
-        assert all((datagram[2] == 1) is (key is not None) for datagram in station.datagrams)
+        everything = station.datagrams + station.beside
+        assert all((datagram[2] == 1) is (key is not None) for datagram in everything)
+        assert {datagram[5] for datagram in station.beside} == {3, 7}
 
     asyncio.run(scenario())
 
@@ -148,7 +158,7 @@ def test_frames_are_shown_as_they_came_and_only_the_vehicles() -> None:
     asyncio.run(scenario())
 
 
-def _nobody(report: VehicleReport) -> None:
+def _nobody(report: VehicleReport | StationAsked) -> None:
     pass
 
 
@@ -175,7 +185,7 @@ def test_a_ground_station_that_is_not_there_costs_nothing_but_a_count() -> None:
     async def scenario() -> None:
         gone = UdpOutAddress("127.0.0.1", free_port(socket.SOCK_DGRAM))
         nowhere = UdpOutAddress("no-such-host.invalid", 14550)
-        forwarding = FrameForwarder([gone, nowhere])
+        forwarding = StationLinks([gone, nowhere], 1, ScaledClock(1.0), _nobody)
         assert forwarding
         forwarding.start()
         try:
@@ -193,7 +203,8 @@ def test_a_ground_station_that_is_not_there_costs_nothing_but_a_count() -> None:
 def test_a_ground_station_that_starts_later_is_shown_the_vehicle() -> None:
     async def scenario() -> None:
         port = free_port(socket.SOCK_DGRAM)
-        forwarding = FrameForwarder([UdpOutAddress("127.0.0.1", port)])
+        address = UdpOutAddress("127.0.0.1", port)
+        forwarding = StationLinks([address], 1, ScaledClock(1.0), _nobody)
         forwarding.start()
         loop = asyncio.get_running_loop()
         try:
@@ -206,7 +217,8 @@ def test_a_ground_station_that_starts_later_is_shown_the_vehicle() -> None:
                 # The refusal of an early datagram may cost the next one.
                 forwarding.show([b"now", b"now"])
                 async with asyncio.timeout(5.0):
-                    assert await loop.sock_recv(late, 100) == b"now"
+                    while await loop.sock_recv(late, 100) != b"now":
+                        pass  # its agent's heartbeat
         finally:
             await forwarding.close()
 

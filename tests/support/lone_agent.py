@@ -65,6 +65,7 @@ class LoneAgent:
         rejoin: bool = False,
         without_bus_s: float | None = None,
         verticals: Verticals | None = None,
+        shows_stations: bool = False,
     ) -> None:
         self.uavs = uavs
         self.me = uavs[0].id
@@ -78,6 +79,7 @@ class LoneAgent:
             rejoin=rejoin,
             without_bus_s=without_bus_s,
             verticals=verticals,
+            shows_stations=shows_stations,
         )
         self.timing = timing
         self.now_s = now_s

@@ -14,6 +14,7 @@ from agent.core.agent_core import AgentCore
 from agent.core.interface import (
     Action,
     Event,
+    Hold,
     Home,
     NotReady,
     Prepare,
@@ -23,6 +24,7 @@ from agent.core.interface import (
     VehicleReady,
     VehicleReport,
 )
+from agent.core.station_words import AnswerStation, StationAction, StationAsked, StationWish
 from agent.runner import run_agent, seat_or_stop
 from swarm.bus.port import Bus, BusEvent, Sample, TokenGone, TokenSeen
 from swarm.model import Origin
@@ -55,12 +57,14 @@ class FakeVehicle:
     """Does at once what it is told, unless its link is broken or it stays away."""
 
     origin: Origin
-    report: Callable[[VehicleReport], None]
+    report: Callable[[VehicleReport | StationAsked], None]
     broken: bool = False
     stays_away: bool = False
     orders: list[VehicleOrder] = field(default_factory=list)
     closed: int = 0
     dropped: dict[str, int] = field(default_factory=dict)
+    told: list[StationAction] = field(default_factory=list)
+    """To ground stations."""
 
     async def start(self) -> None:
         await asyncio.sleep(0)
@@ -73,6 +77,9 @@ class FakeVehicle:
             self.report(VehicleReady())
         if isinstance(order, Return) and not self.stays_away:
             self.report(Home())
+
+    def tell_stations(self, action: StationAction) -> None:
+        self.told.append(action)
 
     async def close(self) -> None:
         self.closed += 1
@@ -127,7 +134,9 @@ async def at_work(
     core = AgentCore(MISSION, "u0", 1, Timing(), memory)
     stop, vehicles, clock = StopRequest(), list[FakeVehicle](), HandClock()
 
-    def make_vehicle(told: MissionConfig, report: Callable[[VehicleReport], None]) -> FakeVehicle:
+    def make_vehicle(
+        told: MissionConfig, report: Callable[[VehicleReport | StationAsked], None]
+    ) -> FakeVehicle:
         vehicles.append(FakeVehicle(Origin(*told.origin), report, broken, stays_away))
         return vehicles[-1]
 
@@ -167,6 +176,19 @@ def test_what_the_vehicle_reports_leads_to_what_is_said() -> None:
                 return any(each is not None and each.body == IDLE for each in said)
 
             await take_until(played.coordinator, free)
+
+    play(scenario)
+
+
+def test_what_a_ground_station_asks_for_is_answered_to_it() -> None:
+    async def scenario() -> None:
+        async with at_work() as played:
+            vehicle = await played.airborne()
+            vehicle.report(StationAsked(7, StationWish.HOLD))
+
+            answers = [told for told in vehicle.told if isinstance(told, AnswerStation)]
+            assert [answer.number for answer in answers] == [7]
+            assert isinstance(vehicle.orders[-1], Hold)
 
     play(scenario)
 
