@@ -96,8 +96,8 @@ class StationDesk:
 
     Args:
         system_id: of the vehicle.
-        signings: of each station in order: signs what it is told and judges what it says; None:
-            nothing is signed.
+        signings: of each station in order: signs what it is told, and judges what it says if that
+            is heeded; None: nothing is signed.
         heeds: whether wishes are heeded.
         heartbeat_interval_s: between two heartbeats.
     """
@@ -113,7 +113,7 @@ class StationDesk:
         self._system = system_id
         self._signings = signings
         self._heeds = heeds
-        self._framers = [Framer(signing) for signing in signings]
+        self._framers = [Framer(signing if heeds else None) for signing in signings]
         self._interval_s = heartbeat_interval_s
         self._heartbeat_at_s = -math.inf
         self._began_s: float | None = None

@@ -36,6 +36,7 @@ from tests.process.router_processes import router
 pytestmark = pytest.mark.process
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
+MAKEFILE = (DEPLOY.parent / "Makefile").read_text()
 ZENOH = DEPLOY / "zenoh"
 SETTINGS = (
     "connect/retry",
@@ -303,14 +304,25 @@ def instructions() -> list[tuple[str, str]]:
     return [(line.split(" ", 1)[0], line.split(" ", 1)[1]) for line in lines if line.strip()]
 
 
-def test_image_has_no_build_tools_and_runs_as_nobody() -> None:
+def stages() -> dict[str, list[tuple[str, str]]]:
+    """The same by stage, from its FROM on; the last one, which has no name, as ""."""
+    found: dict[str, list[tuple[str, str]]] = {}
     steps = instructions()
-    stages = [i for i, (word, _) in enumerate(steps) if word == "FROM"]
-    assert len(stages) == 2
-    final = steps[stages[1] :]
+    for word, said in steps[[word for word, _ in steps].index("FROM") :]:
+        if word == "FROM":
+            name = said.partition(" AS ")[2]
+            found[name] = []
+        found[name].append((word, said))
+    return found
 
-    assert {word for word, _ in steps} <= {
-        *("ARG", "FROM", "RUN", "WORKDIR", "COPY", "ENV", "USER", "ENTRYPOINT", "CMD")
+
+def test_image_has_no_build_tools_and_runs_as_nobody() -> None:
+    final = stages()["fleet"]
+
+    assert stages()[""] == [("FROM", "fleet")], "what a build without a target makes"
+    assert {word for word, _ in instructions()} <= {
+        *("ARG", "FROM", "RUN", "WORKDIR", "COPY", "ENV", "USER", "ENTRYPOINT", "CMD"),
+        *("EXPOSE", "HEALTHCHECK"),
     }
     assert not any(tool in said for _, said in final for tool in ("apt-get", "g++", "pip install"))
     assert [said for word, said in final if word == "COPY"] == [
@@ -318,6 +330,36 @@ def test_image_has_no_build_tools_and_runs_as_nobody() -> None:
     ]
     assert [said for word, said in final if word == "USER"] == ["10001:10001"]
     assert json.loads(dict(final)["ENTRYPOINT"]) == ["swarm"]
+
+
+def test_image_to_try_flies_a_fleet_and_is_asked_whether_its_dashboard_lives() -> None:
+    steps = stages()["demo"]
+    told = dict(steps)
+
+    assert [word for word, _ in steps] == ["FROM", "EXPOSE", "HEALTHCHECK", "CMD"]
+    assert told["FROM"] == "fleet AS demo", "as nobody, with nothing more in it"
+    words = json.loads(told["CMD"])
+    cli.check(words)
+    assert parsed(words)["dashboard"] == f"0.0.0.0:{told['EXPOSE']}"
+    asked = json.loads(told["HEALTHCHECK"].partition(" CMD ")[2])
+    compile(asked[2], "healthcheck", "exec")
+    assert f"127.0.0.1:{told['EXPOSE']}/healthz" in asked[2]
+
+
+def test_a_container_to_work_in_has_what_make_needs_and_no_rights() -> None:
+    file = DEPLOY.parent / ".devcontainer" / "devcontainer.json"
+    told = json.loads(file.read_text())
+
+    build = told["build"]
+    assert (file.parent / build["dockerfile"]).resolve() == DEPLOY / "Containerfile"
+    assert (file.parent / build["context"]).resolve() == DEPLOY.parent
+    steps = stages()[build["target"]]
+    (installs,) = (said for word, said in steps if word == "RUN")
+    assert {"g++", "make", "git", "chromium"} <= set(installs.split())
+    assert f" {told['remoteUser']}" in installs
+    assert dict(steps)["USER"] != "0:0"
+    make, target = told["postCreateCommand"].split()
+    assert (make, f"\n{target.replace('.venv', '$(VENV)')}:" in MAKEFILE) == ("make", True)
 
 
 # -- by hand ------------------------------------------------------------------------------

@@ -56,3 +56,37 @@ def test_own_ids_that_are_none_are_told(text: str, capsys: pytest.CaptureFixture
     assert err.startswith("--ground-id: ")
     assert err.endswith("is not a whole number within 1..255; give SYS or SYS:COMP\n")
     assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "line"),
+    [
+        (
+            [],
+            "--station-actions: there is no ground station whose actions could be taken; name one",
+        ),
+        (
+            ["--forward", "udp:127.0.0.1:14550", "--forward", "udp:192.168.1.5:14550"],
+            "--station-actions: udp:192.168.1.5:14550: anybody on that network could pass for",
+        ),
+    ],
+)
+def test_actions_of_ground_stations_that_anybody_could_be_are_refused(
+    words: list[str], line: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*AGENT, "--station-actions", *words]) == 2
+    output = capsys.readouterr()
+    assert output.out == ""
+    assert output.err.startswith(line)
+    assert output.err.count("\n") == 1
+
+
+def test_actions_are_taken_from_this_machine_or_by_key(tmp_path: Path) -> None:
+    key = tmp_path / "key"
+    key.write_bytes(bytes(range(32)))
+    key.chmod(0o600)
+    far = ["--forward", "udp:192.168.1.5:14550", "--signing-key", str(key)]
+
+    assert main([*AGENT, "--check", "--station-actions", *far]) == 0
+    near = ["--forward", "udp:[::1]:14550", "--forward", "udp:localhost:14551"]
+    assert main([*AGENT, "--check", "--station-actions", *near]) == 0

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -166,6 +168,21 @@ def test_wishes_that_nobody_answers_are_bounded() -> None:
 
     assert sum(isinstance(action, StationAsked) for action in actions) == 16
     assert set(results(actions)) == {(31010, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)}
+
+
+def test_the_file_for_qgroundcontrol_has_each_action() -> None:
+    file = Path(__file__).parents[4] / "deploy/ground-stations/qgroundcontrol-actions.json"
+    told = json.loads(file.read_text())
+
+    assert (told["version"], told["fileType"]) == (1, "MavlinkActions")
+    for action in told["actions"]:
+        assert set(action) <= {"label", "description", "mavCmd", "compId", "param1"}
+        data = command(action["mavCmd"], action.get("param1", 0.0), component=action["compId"])
+        (asked,) = desk().hear(0, data)
+        assert isinstance(asked, StationAsked)
+        assert action["label"].lower().startswith(asked.wish.value)
+        assert asked.confirmed is action["label"].endswith("confirm")
+    assert {action["mavCmd"] for action in told["actions"]} == set(WISHES)
 
 
 # -- keys -------------------------------------------------------------------------------------
