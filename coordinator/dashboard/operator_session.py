@@ -132,7 +132,7 @@ class OperatorSession:
             raise RefusedError(Refusal.TOO_EARLY if early else Refusal.WRONG, text)
         if tracked_request.task is not None and tracked_request.task not in what:
             what = f"{what}: {tracked_request.task}"
-        row = CommandRow(self._next, what, CommandState.PENDING, "")
+        row = CommandRow(self._next, what, CommandState.PENDING, "", tracked_request.task)
         self._next += 1
         self.rows.append(row)
         self._given.append(_Given(tracked_request, row, who))
@@ -152,7 +152,8 @@ class OperatorSession:
         self._given = [given for given in self._given if given.row.state is CommandState.PENDING]
 
     def _close(self, given: _Given, text: str, state: CommandState) -> None:
-        before, given.row = given.row, replace(given.row, state=state, result=text)
+        task = given.tracked_request.task
+        before, given.row = given.row, replace(given.row, state=state, result=text, task=task)
         if before in self.rows:
             self.rows[self.rows.index(before)] = given.row
         said = {"n": before.n, "what": before.text, "who": given.who, "result": text}

@@ -31,6 +31,8 @@ class CommandRow:
     state: CommandState
     result: str
     """What came of it, in words; empty as long as that is open."""
+    task: str | None = None
+    """Id of the task that it is about, if any."""
 
 
 class Refusal(StrEnum):

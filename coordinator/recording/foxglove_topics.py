@@ -15,15 +15,28 @@ from typing import Final
 
 from pydantic import TypeAdapter
 
+from coordinator.mission_view.drawing import (
+    AREA_COLOUR,
+    BASE_COLOUR,
+    GREY,
+    STATE_COLOURS,
+    STILL_M_S,
+    UNENDED,
+    WHITE,
+    ZONE_COLOUR,
+    Colour,
+    colour_of,
+    drawn_size_m,
+    raised,
+    ways_ahead,
+)
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.mission_view.presentation import uav_colour
 from coordinator.mission_view.scene import LEFT_OUT, TAKEN, Scene, scene_of
 from coordinator.mission_view.uav_state import LOST, UavView
 from coordinator.recording.foxglove_schemas import (
     LOCATION_FIX,
     LOG,
     SCENE_UPDATE,
-    Colour,
     Json,
     Point,
     arrow,
@@ -46,27 +59,8 @@ FRAME: Final = "mission"
 """Name of the local frame: metres east, north and up of the mission's origin."""
 MOST_LABELS: Final = 150
 """A scene of more tasks shows them without their names."""
-_SMALLEST_M: Final = 0.05
 _LEVEL: Final = re.compile(r"""\blevel["']?[=:] ?["']?(\w+)""")
 """In lines of logfmt and in JSON."""
-_STILL_M_S: Final = 0.1
-"""Who is slower points nowhere."""
-_OF_MISSION: Final = 1.0 / 60.0
-"""Size of a task, as a part of the mission's extent."""
-_GREY: Final = (0.6, 0.6, 0.6, 0.5)
-_ZONE: Final = (0.84, 0.37, 0.0, 0.9)
-_AREA: Final = (0.0, 0.45, 0.7, 0.9)
-_BASE: Final = (0.8, 0.47, 0.65, 0.9)
-_WHITE: Final = (1.0, 1.0, 1.0, 1.0)
-# Okabe and Ito's colours; states differ in shape and opacity, too.
-_STATE_COLOURS: Final = {
-    "open": (0.9, 0.62, 0.0, 1.0),
-    "taken": (0.34, 0.71, 0.91, 1.0),
-    "left_out": (0.9, 0.62, 0.0, 0.4),
-    "done": (0.0, 0.62, 0.45, 0.6),
-    "failed": (0.84, 0.37, 0.0, 1.0),
-    "withdrawn": _GREY,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,7 +131,7 @@ class FoxgloveTopics:
         scene = scene_of(mission_state, now_s)
         yield _progress(mission_state, scene, now_s)
         yield from self._fixes(scene, Origin(*mission_state.replica.brief.origin), time_ns)
-        size_m = _size_m(scene)
+        size_m = drawn_size_m(scene)
         yield _scene("uavs", [_uav(view, size_m, time_ns) for view in scene.uavs])
         yield from self._field(scene, size_m, time_ns)
         tasks = tuple(
@@ -185,9 +179,9 @@ class FoxgloveTopics:
             if self._places.get(view.id) == view.place_enu_m:
                 continue
             self._places[view.id] = view.place_enu_m
-            at = _raised(view.place_enu_m, view.layer_m)
+            at = raised(view.place_enu_m, view.layer_m)
             fix = location_fix(
-                view.id, time_ns, *wgs84_from_enu(origin, at), _uav_colour(view.number)
+                view.id, time_ns, *wgs84_from_enu(origin, at), colour_of(view.number)
             )
             yield FileMessage(f"/uav/{view.id}/fix", LOCATION_FIX, _bytes(fix))
 
@@ -232,8 +226,8 @@ def _scene(name: str, entities: list[Json]) -> FileMessage:
 
 
 def _uav(view: UavView, size_m: float, time_ns: int) -> Json:
-    colour = _GREY if view.troubled else _uav_colour(view.number)
-    at = _raised(view.place_enu_m, view.layer_m)
+    colour = GREY if view.troubled else colour_of(view.number)
+    at = raised(view.place_enu_m, view.layer_m)
     facts = {"does": str(view.does), "task": view.task or "", "note": view.note}
     if view.battery_frac is not None:
         facts["battery"] = f"{view.battery_frac:.0%}"
@@ -247,10 +241,10 @@ def _uav(view: UavView, size_m: float, time_ns: int) -> Json:
     # Sphere and arrow: where it is, and where to, as far as that is known.
     shapes: dict[str, list[Json]] = {
         "spheres": [sphere(at, size_m, colour)],
-        "texts": [text(_raised(at, size_m), label, _WHITE)],
+        "texts": [text(raised(at, size_m), label, WHITE)],
     }
     east_m_s, north_m_s, _ = view.velocity_enu_m_s or (0.0, 0.0, 0.0)
-    if math.hypot(east_m_s, north_m_s) > _STILL_M_S:
+    if math.hypot(east_m_s, north_m_s) > STILL_M_S:
         yaw_rad = math.atan2(north_m_s, east_m_s)
         shapes["arrows"] = [arrow(at, yaw_rad, 2.0 * size_m, colour)]
     return entity(view.id, FRAME, time_ns, facts, **shapes)
@@ -260,7 +254,9 @@ def _zone(zone: Zone, time_ns: int) -> Json:
     """Its borders, on its floor and below its ceiling where it has them."""
     heights_m = {zone.floor_m or 0.0} | ({zone.ceiling_m} if zone.ceiling_m is not None else set())
     lines = [
-        line_strip([(east_m, north_m, up_m) for east_m, north_m in (*ring, ring[0])], _ZONE, 3.0)
+        line_strip(
+            [(east_m, north_m, up_m) for east_m, north_m in (*ring, ring[0])], ZONE_COLOUR, 3.0
+        )
         for ring in (zone.polygon_enu_m, *zone.holes_enu_m)
         for up_m in sorted(heights_m)
     ]
@@ -269,19 +265,21 @@ def _zone(zone: Zone, time_ns: int) -> Json:
     if zone.inclusive:
         facts["inclusive"] = "nobody may leave it"
     east_m, north_m = zone.polygon_enu_m[0]
-    label = text((east_m, north_m, zone.floor_m or 0.0), zone.id, _WHITE)
+    label = text((east_m, north_m, zone.floor_m or 0.0), zone.id, WHITE)
     return entity(f"zone {zone.id}", FRAME, time_ns, facts, lines=lines, texts=[label])
 
 
 def _area(area: Area, time_ns: int) -> Json:
     """Its borders, on the ground."""
     lines = [
-        line_strip([(east_m, north_m, 0.0) for east_m, north_m in (*ring, ring[0])], _AREA, 2.0)
+        line_strip(
+            [(east_m, north_m, 0.0) for east_m, north_m in (*ring, ring[0])], AREA_COLOUR, 2.0
+        )
         for ring in (area.polygon_enu_m, *area.holes_enu_m)
     ]
     east_m, north_m = area.polygon_enu_m[0]
     facts = {"lines": str(area.lines), "value": f"{area.value:g}"}
-    label = text((east_m, north_m, 0.0), area.id, _WHITE)
+    label = text((east_m, north_m, 0.0), area.id, WHITE)
     return entity(f"area {area.id}", FRAME, time_ns, facts, lines=lines, texts=[label])
 
 
@@ -296,8 +294,8 @@ def _base(base: Base, who: str, size_m: float, time_ns: int) -> Json:
     facts = {"swap": f"{base.swap_s:g} s", "uavs": who}
     if base.slots is not None:
         facts["slots"] = str(base.slots)
-    solid = cube(base.position_enu_m, size_m, _BASE)
-    label = text(_raised(base.position_enu_m, size_m), base.id, _WHITE)
+    solid = cube(base.position_enu_m, size_m, BASE_COLOUR)
+    label = text(raised(base.position_enu_m, size_m), base.id, WHITE)
     return entity(f"base {base.id}", FRAME, time_ns, facts, cubes=[solid], texts=[label])
 
 
@@ -309,13 +307,9 @@ def _task_entities(scene: Scene, size_m: float, time_ns: int) -> list[Json]:
     That of the tasks that the plan leaves out tells why.
     """
     tasks, entities = scene.tasks, []
-    for state, colour in _STATE_COLOURS.items():
+    for state, colour in STATE_COLOURS.items():
         mine = [task.position_enu_m for task in tasks if task.stands == state]
-        shape, kind = (
-            (sphere, "spheres")
-            if state in (TaskState.OPEN.value, TAKEN, LEFT_OUT)
-            else (cube, "cubes")
-        )
+        shape, kind = (sphere, "spheres") if state in UNENDED else (cube, "cubes")
         solids = [shape(at, size_m, colour) for at in mine]
         ways = [
             line_strip(task.path_enu_m, colour, 2.0)
@@ -326,40 +320,15 @@ def _task_entities(scene: Scene, size_m: float, time_ns: int) -> list[Json]:
         name = state.replace("_", " ")
         entities.append(entity(name, FRAME, time_ns, facts, lines=ways, **{kind: solids}))
     if len(tasks) <= MOST_LABELS:
-        labels = [text(_raised(t.position_enu_m, -size_m), t.id, _WHITE) for t in tasks]
+        labels = [text(raised(t.position_enu_m, -size_m), t.id, WHITE) for t in tasks]
         entities.append(entity("names", FRAME, time_ns, {}, texts=labels))
     return entities
 
 
 def _lists(scene: Scene) -> tuple[tuple[str, tuple[Point, ...], Colour], ...]:
-    """What each UAV's list still holds: places in order; in the field, the way that it flies."""
-    places = {task.id: task.position_enu_m for task in scene.tasks}
-    ahead: list[tuple[str, tuple[Point, ...], Colour]] = []
-    for view in scene.uavs:
-        points = tuple(places[task] for task in view.planned if task in places)
-        if view.ways is not None:
-            flat_m = (*view.ways.leg[1:], *view.ways.ahead[1:])
-            points = tuple((east_m, north_m, view.start_enu_m[2]) for east_m, north_m in flat_m)
-        ahead.append((str(view.id), points, _uav_colour(view.number)))
-    return tuple(ahead)
-
-
-def _size_m(scene: Scene) -> float:
-    places = [*(uav.start_enu_m for uav in scene.uavs), *(t.position_enu_m for t in scene.tasks)]
-    if not places:
-        return 1.0
-    spans_m = [max(axis) - min(axis) for axis in zip(*places, strict=True)]
-    return float(max(_SMALLEST_M, _OF_MISSION * max(spans_m)))
-
-
-def _raised(at: Point, up_m: float) -> Point:
-    return at[0], at[1], at[2] + up_m
-
-
-def _uav_colour(number: int) -> Colour:
-    code = uav_colour(number)
-    red, green, blue = (int(code[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
-    return round(red, 3), round(green, 3), round(blue, 3), 1.0
+    """What each UAV's list still holds, in the colour of the UAV."""
+    ahead = ways_ahead(scene)
+    return tuple((str(uav.id), ahead[uav.id], colour_of(uav.number)) for uav in scene.uavs)
 
 
 def _bytes(message: Json) -> bytes:

@@ -30,6 +30,7 @@ EXTRAS: Final[Mapping[str, tuple[str, ...]]] = MappingProxyType(
         "study": ("distributed", "pyarrow"),
         "bench": ("ortools", "vrp_cli"),
         "terrain": ("rasterio",),
+        "ros2": ("rosbags", "xxhash"),
     }
 )
 """Modules that are imported where they are needed, by the extra that brings them."""

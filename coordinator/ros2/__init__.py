@@ -1,0 +1,1 @@
+"""A mission in the ROS 2 graph: topics that mirror it, services that take orders."""
