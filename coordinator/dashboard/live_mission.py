@@ -32,6 +32,7 @@ class LiveMission:
     Args:
         mission: its name; None for the only one there is, and after it for the next.
         open_bus: takes a seat on the bus, however long that takes.
+        complete: see `MissionObserver`.
     """
 
     def __init__(
@@ -43,12 +44,14 @@ class LiveMission:
         speedup: float,
         *,
         may_order: bool = True,
+        complete: bool = False,
     ) -> None:
         self.speedup = speedup
         self.orders = self if may_order else None
         """Takes orders; None where the keys are no operator's."""
         self.player: PlaybackControl | None = None
         self._mission = mission
+        self._complete = complete
         self._open_bus = open_bus
         self._network = network
         self._clock = clock
@@ -89,6 +92,7 @@ class LiveMission:
             patience_s=EFFECT_S * self.speedup,
             stays=self._mission is not None,
             first=first,
+            complete=self._complete,
         )
         replica = self._operator_session.mission_state.replica
         self._shell = observer_shell(

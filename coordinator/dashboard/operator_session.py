@@ -48,6 +48,7 @@ class OperatorSession:
         incarnation: wall time in milliseconds.
         patience_s: how long to wait for the effect of an order [s of ``now_s``].
         stays: look on for ever; else until the mission is over and everyone has left.
+        complete: see `MissionObserver`.
     """
 
     def __init__(
@@ -59,6 +60,7 @@ class OperatorSession:
         patience_s: float,
         stays: bool = True,
         first: int = 1,
+        complete: bool = False,
     ) -> None:
         self.rows: deque[CommandRow] = deque(maxlen=KEPT_ROWS)
         """What was ordered, oldest first."""
@@ -67,6 +69,7 @@ class OperatorSession:
         self._incarnation = incarnation
         self._patience_s = patience_s
         self._stays = stays
+        self._complete = complete
         self._next = first
         self._tokens: set[str] = set()
         self._given: list[_Given] = []
@@ -162,7 +165,7 @@ class OperatorSession:
     # -- flights ----------------------------------------------------------------------
 
     def _begin(self) -> tuple[MissionObserver, RequestTracker]:
-        observer = MissionObserver(self._mission, self._timing, None, complete=False)
+        observer = MissionObserver(self._mission, self._timing, None, complete=self._complete)
         errands = RequestTracker(
             observer.mission_state,
             incarnation=self._incarnation,

@@ -139,6 +139,7 @@ def ros2(
         ScaledClock(speedup),
         speedup,
         may_order=services,
+        complete=True,
     )
 
     async def work() -> int:

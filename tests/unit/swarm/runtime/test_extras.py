@@ -50,6 +50,7 @@ LACKING = f"""
     ground  swarm study            : study table-1
     ground  swarm reproduce        : reproduce
     bench   --methods ortools      : bench plan --methods ortools
+    ros2    swarm ros2             : ros2 --check
 """
 
 _HIDDEN = """
