@@ -190,7 +190,7 @@ class RefusedTasks:
         """How often, and until when."""
 
     def add(self, task: str, now_s: float, *, passes: bool = False) -> None:
-        """The vehicle has refused ``task``; or it is another UAV that was in the way (``passes``)."""
+        """Leave ``task`` alone: the vehicle refused it, or others were in the way (``passes``)."""
         times = 1 + self._refusals.get(task, (0, 0.0))[0]
         pause_s = _PASSING_FRAC * self._pause_s if passes else self._pause_s
         # Each time for longer, so that a fleet may find that nobody takes what is left.

@@ -261,7 +261,9 @@ class Run:
                 planned_s += task.service_s + max(
                     flown_s(away_m, u.speed_m_s, u.acceleration_m_s2) for u in flown.uavs
                 )
-        return self._zero_s + latest_s + PATIENCE * planned_s + patience_s
+        # In air that all share they may have to fly and to land one after the other.
+        turns = 1 if flown.separation_m is None else len(flown.uavs)
+        return self._zero_s + latest_s + PATIENCE * planned_s * turns + patience_s
 
 
 @contextlib.asynccontextmanager
