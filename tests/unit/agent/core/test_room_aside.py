@@ -6,8 +6,8 @@ from dataclasses import replace
 
 from agent.core.room_aside import RoomAside
 from swarm.model.ids import COORDINATOR, OPERATOR
-from swarm.protocol.field_messages import ZoneSpec
-from swarm.protocol.messages import Message, MissionConfig, Stamp, ZoneEdit
+from swarm.protocol.field_messages import ZoneEdit, ZoneSpec
+from swarm.protocol.messages import Message, MissionConfig, Stamp
 from swarm.protocol.registers import Replica
 from tests.support.builders import MISSION, brief, uav
 
