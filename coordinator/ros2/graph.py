@@ -20,7 +20,7 @@ from coordinator.ros2.bridge import RosCall
 from coordinator.ros2.message_types import Fields, MalformedError, MessageTypes
 from coordinator.ros2.mirror import RosMessage
 from coordinator.ros2.services import RosService
-from coordinator.ros2.wire import Attachment, Endpoint, EntityKind, RosNode
+from coordinator.ros2.wire import Attachment, EntityKind, RosEndpoint, RosNode
 from swarm.bus.config import DEFAULT_LEASE_S, config_file_fault
 from swarm.bus.zenoh_session import close_session, open_session, plain_error, session_config
 from swarm.runtime.clock import unix_ns
@@ -38,7 +38,7 @@ _CLOSE_S: Final = 1.0
 class _Topic:
     """Something that is published."""
 
-    endpoint: Endpoint
+    endpoint: RosEndpoint
     publisher: zenoh.Publisher | None = None
     """Once the thread has made it."""
     token: zenoh.LivelinessToken | None = None
@@ -165,7 +165,7 @@ class ZenohRosGraph:
         self._call(begin)
         return topic
 
-    def _endpoint(self, kind: EntityKind, name: str, typ: str) -> Endpoint:
+    def _endpoint(self, kind: EntityKind, name: str, typ: str) -> RosEndpoint:
         self._numbers += 1
         return self._node.endpoint(self._numbers, kind, name, typ, self.types.hash_of(typ))
 

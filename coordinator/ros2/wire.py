@@ -53,7 +53,9 @@ class RosNode:
         place = f"{_TOKENS}/{self.domain_id}/{self.session}"
         return f"{place}/0/{number}/{kind}/%/%/{self.name}"
 
-    def endpoint(self, number: int, kind: EntityKind, name: str, typ: str, hashed: str) -> Endpoint:
+    def endpoint(
+        self, number: int, kind: EntityKind, name: str, typ: str, hashed: str
+    ) -> RosEndpoint:
         """What it publishes or serves.
 
         Args:
@@ -66,14 +68,14 @@ class RosNode:
         package, folder, short = typ.split("/")
         dds = f"{package}::{folder}::dds_::{short}_"
         mangled = name.replace("/", "%")
-        return Endpoint(
+        return RosEndpoint(
             key=f"{self.domain_id}/{name.strip('/')}/{dds}/{hashed}",
             token=f"{self._prefix(number, kind)}/{mangled}/{dds}/{hashed}/{QOS}",
         )
 
 
 @dataclass(frozen=True, slots=True)
-class Endpoint:
+class RosEndpoint:
     """A topic that is published, or a service."""
 
     key: str

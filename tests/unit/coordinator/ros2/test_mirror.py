@@ -139,6 +139,7 @@ def test_diagnostics_grow_worse_with_what_happens(teller: Teller) -> None:
         told = told_by(teller)["/diagnostics"]["status"]
         return [(each["name"], each["level"], each["message"]) for each in told]
 
+    teller.claim("uav-1", "t1", 8.0)
     teller.status("uav-1", StatusPhase.FLYING, battery_frac=0.9)
     teller.status("uav-2", StatusPhase.IDLE, battery_frac=0.1, note="battery low")
     assert levels() == [
@@ -147,12 +148,12 @@ def test_diagnostics_grow_worse_with_what_happens(teller: Teller) -> None:
         ("peckorder: uav-2", 1, "idle: battery low"),
     ]
 
-    teller.claim("uav-1", "t1", 8.0)
     teller.lose("uav-1", 0.6)
     assert levels()[1][:2] == ("peckorder: uav-1", 2)
 
 
 def test_markers_show_tasks_uavs_lists_and_zones(teller: Teller) -> None:
+    teller.claim("uav-1", "t1", 8.0)
     teller.status("uav-1", StatusPhase.FLYING, position_enu_m=(1.0, 2.0, 0.0))
     teller.end("uav-2", "t2", 0.5)
     corners = ((10.0, 10.0), (20.0, 10.0), (20.0, 20.0))

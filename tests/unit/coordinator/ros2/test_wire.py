@@ -11,7 +11,14 @@ from zenoh_ros2_sdk.attachment import Attachment as SdkAttachment
 from zenoh_ros2_sdk.discovery import _parse_liveliness_keyexpr
 from zenoh_ros2_sdk.qos import DEFAULT_QOS_PROFILE, QosProfile
 
-from coordinator.ros2.wire import Attachment, Endpoint, EntityKind, RosNode, is_node_name, ros_names
+from coordinator.ros2.wire import (
+    Attachment,
+    EntityKind,
+    RosEndpoint,
+    RosNode,
+    is_node_name,
+    ros_names,
+)
 from swarm.model.ids import valid_id
 
 STRING = "RIHS01_df668c740482bbd48fb39d76a70dfd4bd59db1288021743503259e948f6b1a18"
@@ -49,7 +56,7 @@ def test_an_endpoint_is_identified_by_the_hash_of_its_token() -> None:
     )
     # XXH3 of nothing is 99aa06d3014798d8 (high) and 6001c324468d497f (low); rmw_zenoh copies low,
     # then high, as little-endian machines have them.
-    nothing = Endpoint("", "")
+    nothing = RosEndpoint("", "")
 
     assert nothing.gid.hex() == "7f498d4624c30160d8984701d306aa99"
     assert len({one.gid, other.gid}) == 2
