@@ -24,9 +24,7 @@ from swarm.runtime.options import (
 
 if TYPE_CHECKING:
     from agent.core.agent_core import AgentCore
-    from agent.core.interface import VehicleReport
-    from agent.core.station_words import StationAsked
-    from agent.runner import MakeVehicle, Vehicle
+    from agent.runner import MakeVehicle, OnReport, Vehicle
     from swarm.bus.config import BusConfig
     from swarm.identity import Identity
     from swarm.protocol.messages import MissionConfig
@@ -222,11 +220,10 @@ def agent(
       --keys keys/quad-2 --connect tls/192.168.1.2:7447 --state /var/lib/peckorder
     """
     from agent.core.agent_core import AgentCore
-    from agent.core.ground_station import CONFIRM_S
     from agent.core.path_clearance import PATH_CLEARANCE_M
     from agent.core.verticals import Verticals
     from agent.links.mavlink_vehicle import MavlinkVehicle
-    from agent.vehicle.config import BridgeConfig, check_station_actions, status_rate_for
+    from agent.vehicle.config import BridgeConfig, status_rate_for
     from agent.vehicle.signing import load_signing_key
     from swarm.identity import Role
     from swarm.model import Origin
@@ -240,9 +237,8 @@ def agent(
     _check_ids(mission, uav)
     network = seat.network
     config = seat.config(mission=mission, roles=(Role.UAV,), name=uav)
-    _check_links(mavlink, forward or ())
-    if station_actions:
-        check_station_actions(forward or (), signed=signing_key is not None)
+    shown = forward or ()
+    _check_links(mavlink, shown, heeds=station_actions, signed=signing_key is not None)
     own_system_id, own_component_id = _ground_ids(ground_id)
     key = None if signing_key is None else load_signing_key(signing_key)
     if check:
@@ -250,9 +246,7 @@ def agent(
     if config.identity is not None and key is None:
         _tell_unsigned(uav, config.identity)
 
-    def vehicle(
-        brief: MissionConfig, report: Callable[[VehicleReport | StationAsked], None]
-    ) -> Vehicle:
+    def vehicle(brief: MissionConfig, report: OnReport) -> Vehicle:
         settings = BridgeConfig(
             system_id=system_id,
             origin=Origin(*brief.origin),
@@ -273,13 +267,7 @@ def agent(
             fence_height_m=fence_height_m,
         ).for_speedup(speedup)
         return MavlinkVehicle(
-            settings,
-            mavlink,
-            clock,
-            report,
-            key=key,
-            forward=forward or (),
-            heeds_stations=station_actions,
+            settings, mavlink, clock, report, key=key, forward=shown, heeds_stations=station_actions
         )
 
     def core(memory: Memory | None) -> AgentCore:
@@ -294,8 +282,7 @@ def agent(
             without_bus_s=None if without_bus_s is None else without_bus_s * speedup,
             path_clearance_m=PATH_CLEARANCE_M,
             verticals=Verticals(),
-            shows_stations=bool(forward),
-            confirm_s=CONFIRM_S * speedup,
+            shows_stations=bool(shown),
         )
 
     clock = ScaledClock(speedup)
@@ -351,12 +338,14 @@ def _live(
             store.close()
 
 
-def _check_links(mavlink: str, forward: Sequence[str]) -> None:
-    from agent.vehicle.config import parse_forward, parse_link
+def _check_links(mavlink: str, forward: Sequence[str], *, heeds: bool, signed: bool) -> None:
+    from agent.vehicle.config import check_station_actions, parse_forward, parse_link
 
     parse_link(mavlink)
     for url in forward:
         parse_forward(url)
+    if heeds:
+        check_station_actions(forward, signed=signed)
 
 
 def _tell_unsigned(uav: str, identity: Identity) -> None:

@@ -71,9 +71,10 @@ class Vehicle(Protocol):
         ...
 
 
-MakeVehicle = Callable[[MissionConfig, Callable[[VehicleReport | StationAsked], None]], Vehicle]
-"""Makes the vehicle for a mission, with a callback for its reports, and for what ground stations
-that are shown it ask for."""
+OnReport = Callable[[VehicleReport | StationAsked], None]
+"""Hears what a vehicle reports, and what ground stations that are shown it ask for."""
+MakeVehicle = Callable[[MissionConfig, OnReport], Vehicle]
+"""Makes the vehicle for a mission."""
 
 
 class _Dropping(Protocol):

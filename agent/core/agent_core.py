@@ -11,19 +11,14 @@ others in agent.core.state_sync. Leaves out: flying (agent.vehicle) and transpor
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from typing import TYPE_CHECKING
 
 from agent.core.announcer import Announcer
-from agent.core.context import AgentContext, AgentPart
+from agent.core.context import AgentContext, AgentPart, usual_field_rule
 from agent.core.field_tasking import FieldTasking
-from agent.core.ground_station import CONFIRM_S, HELD_BEFORE, GroundStation, was_held
-from agent.core.interface import (
-    Action,
-    Event,
-    OrderVehicle,
-    Telemetry,
-)
+from agent.core.ground_station import HELD_BEFORE, GroundStation, was_held
+from agent.core.interface import Action, Event, OrderVehicle, Telemetry
 from agent.core.memory import RecoveredState, SaveCondition
 from agent.core.mission_view import MissionView, Peers
 from agent.core.near_traffic import NearTraffic
@@ -65,19 +60,12 @@ from swarm.protocol.timing import StallDetector, Timing, earliest
 from swarm.protocol.uav_messages import MOST_REASONS, Claim, ClaimPhase, Status, StatusPhase
 
 if TYPE_CHECKING:
-    from agent.core.field_decision import FieldRule, FieldRuleMaker
+    from agent.core.field_decision import FieldRuleMaker
 
 IMPOSSIBLE = "impossible transition"
 """Begins the log line about a trigger that the agent's state has no transition for: a bug."""
 _MINDS_BUS_LOSS = TAKES_TASKS | PAUSED_BY_OPERATOR | {AgentState.PREPARING}
 """There is a flight to break off for want of a bus."""
-
-
-def usual_field_rule(name: str, routes: Mapping[str, Sequence[str]]) -> FieldRule | None:
-    """As `agent.core.field_decision.field_rule_of`, which plain missions never load."""
-    from agent.core.field_decision import field_rule_of
-
-    return field_rule_of(name, routes)
 
 
 class AgentCore(AgentPart):
@@ -102,7 +90,6 @@ class AgentCore(AgentPart):
             fleet needs the same.
         make_field_rule: the same where the field's constraints count.
         shows_stations: whether there are ground stations to be shown what it does.
-        confirm_s: how long an abort that a ground station asked for may be confirmed.
     """
 
     def __init__(
@@ -121,7 +108,6 @@ class AgentCore(AgentPart):
         verticals: Verticals | None = None,
         make_field_rule: FieldRuleMaker = usual_field_rule,
         shows_stations: bool = False,
-        confirm_s: float = CONFIRM_S,
     ) -> None:
         self.uav = uav
         self.replica = Replica()
@@ -149,9 +135,8 @@ class AgentCore(AgentPart):
         self._near_traffic.when_disturbed = self._tasking.disturbed
         self._ending = EndCondition(context)
         self._commander = VehicleCommander(context, self._tasking, self._ending)
-        self._station = GroundStation(
-            context, self._tasking, self._commander, confirm_s=confirm_s, shown=shows_stations
-        )
+        parts = context, self._tasking, self._commander
+        self._station = GroundStation(*parts, shown=shows_stations)
         self._sync = StateSync(context, self._tasking)
         self._queries = self._sync.queries
         self._recovered = RecoveredState(uav, memory, memory_age_s, timing)

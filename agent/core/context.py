@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -18,7 +19,14 @@ from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import Claim
 
 if TYPE_CHECKING:
-    from agent.core.field_decision import FieldRuleMaker
+    from agent.core.field_decision import FieldRule, FieldRuleMaker
+
+
+def usual_field_rule(name: str, routes: Mapping[str, Sequence[str]]) -> FieldRule | None:
+    """As `agent.core.field_decision.field_rule_of`, which plain missions never load."""
+    from agent.core.field_decision import field_rule_of
+
+    return field_rule_of(name, routes)
 
 
 @dataclass(frozen=True, slots=True)

@@ -12,8 +12,6 @@ nothing that the operator had said by then explains it.
 
 from __future__ import annotations
 
-import math
-
 from agent.core.context import AgentContext, AgentPart
 from agent.core.field_tasking import FieldTasking
 from agent.core.states import HEADED_HOME, PAUSED_BY_OPERATOR, AgentState
@@ -31,8 +29,6 @@ from swarm.protocol.operator_commands import newest_command
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import ClaimPhase
 
-CONFIRM_S = 10.0
-"""So long after an abort was asked for it may be confirmed [s]."""
 HELD_BEFORE = "held at a ground station in an earlier life"
 
 _DONE = StationVerdict.DONE, ""
@@ -50,7 +46,6 @@ class GroundStation(AgentPart):
     Args:
         tasking: the UAV's tasks and bases.
         commander: stops the vehicle, and brings it home.
-        confirm_s: how long an abort that was asked for may be confirmed.
         shown: whether there is a ground station to be shown anything.
     """
 
@@ -60,21 +55,18 @@ class GroundStation(AgentPart):
         tasking: FieldTasking,
         commander: VehicleCommander,
         *,
-        confirm_s: float,
         shown: bool,
     ) -> None:
         super().__init__(context)
         self._tasking = tasking
         self._commander = commander
-        self._confirm_s = confirm_s
         self._shown = shown
-        self._abort_asked_s = -math.inf
         self._last: tuple[object, ...] | None = None
         """All that was shown last, or what it was worked out from."""
 
     def hear(self, asked: StationAsked, now_s: float) -> None:
         """Do what is asked for, or say why not."""
-        verdict, reason = self._heed(asked, now_s)
+        verdict, reason = self._heed(asked.wish, now_s)
         wish = asked.wish.value
         self._log("told at a ground station", wish=wish, verdict=verdict.value, reason=reason)
         self._actions.append(AnswerStation(asked.number, verdict, reason))
@@ -111,8 +103,8 @@ class GroundStation(AgentPart):
 
     # -- what is asked for ----------------------------------------------------------------
 
-    def _heed(self, asked: StationAsked, now_s: float) -> tuple[StationVerdict, str]:
-        state, wish = self._machine.state, asked.wish
+    def _heed(self, wish: StationWish, now_s: float) -> tuple[StationVerdict, str]:
+        state = self._machine.state
         if state is AgentState.SYNCING:
             return StationVerdict.NOT_NOW, "its agent is learning what the others know"
         if state is AgentState.OUT or self._machine.has_ended:
@@ -123,17 +115,10 @@ class GroundStation(AgentPart):
                 return self._hold(now_s)
             case StationWish.RESUME:
                 return self._resume(now_s)
-            case StationWish.RETURN:
+            case StationWish.RETURN | StationWish.ABORT:
                 return self._go_home(wish, now_s)
             case StationWish.READY:
                 return self._let_start()
-            case StationWish.ABORT if asked.confirmed:
-                if now_s > self._abort_asked_s + self._confirm_s and not self._flies_home:
-                    return StationVerdict.NOT_NOW, "ask for the abort first, then confirm it"
-                return self._go_home(wish, now_s)
-            case StationWish.ABORT:
-                self._abort_asked_s = now_s
-                return StationVerdict.DONE, "abort asked for: confirm it, or nothing happens"
 
     def _hold(self, now_s: float) -> tuple[StationVerdict, str]:
         if self._machine.state not in PAUSED_BY_OPERATOR:

@@ -26,7 +26,7 @@ class StationWish(Enum):
     READY = "ready"
     """Start again from the base: somebody has changed the battery."""
     ABORT = "abort"
-    """As a return, of every vehicle that hears of it. It counts once it has been confirmed."""
+    """As a return, of every vehicle that hears of it."""
 
 
 class StationVerdict(Enum):
@@ -46,8 +46,6 @@ class StationAsked:
     number: int
     """Repeated by the answer."""
     wish: StationWish
-    confirmed: bool = False
-    """Of an abort: whether this is its second step."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -95,8 +95,8 @@ class StationLinks:
         for link in self._links:
             await link.close()
 
-    def _heard(self, station: int, data: bytes, source: Hashable | None) -> None:
-        self._carry_out(self._desk.hear(station, data, source))
+    def _heard(self, station: int, data: bytes) -> None:
+        self._carry_out(self._desk.hear(station, data, self._clock.now_s()))
 
     def _carry_out(self, actions: Sequence[DeskAction]) -> None:
         for action in actions:
@@ -117,7 +117,7 @@ class StationLinks:
 class _Ear:
     """Listens to one ground station."""
 
-    def __init__(self, number: int, heard: Callable[[int, bytes, Hashable | None], None]) -> None:
+    def __init__(self, number: int, heard: Callable[[int, bytes], None]) -> None:
         self._number = number
         self._heard = heard
 
@@ -128,4 +128,4 @@ class _Ear:
         pass
 
     def received(self, data: bytes, source: Hashable | None = None) -> None:
-        self._heard(self._number, data, source)
+        self._heard(self._number, data)

@@ -24,7 +24,7 @@ Source: https://mavlink.io/en/messages/common.html
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -52,6 +52,8 @@ WISHES = {
 }
 ASK, CONFIRM = 1.0, 2.0
 """First parameter of an abort."""
+CONFIRM_INTERVALS = 10.0
+"""So many intervals of its heartbeats after an abort was asked for it may be confirmed."""
 PHASES = tuple(StatusPhase)
 """The value ``phase`` is a place in it, from 0."""
 
@@ -82,7 +84,7 @@ DeskAction = TellStation | StationAsked
 
 
 @dataclass(frozen=True, slots=True)
-class _Asked:
+class _OpenWish:
     """A wish that has not been answered yet."""
 
     station: int
@@ -121,7 +123,9 @@ class StationDesk:
         self._sender = mavlink.MAVLink(None, srcSystem=system_id, srcComponent=ONBOARD_COMPUTER)
         self._shown: ShowStations | None = None
         self._shown_s = 0.0
-        self._asked: dict[int, _Asked] = {}
+        self._asked: dict[int, _OpenWish] = {}
+        self._abort_asked_s = [-math.inf for _ in signings]
+        """When each station asked for an abort last."""
         self._n_asked = 0
         self._text_id = 0
         self._told = ""
@@ -147,41 +151,53 @@ class StationDesk:
 
     # -- what is asked for -------------------------------------------------------------------
 
-    def hear(self, station: int, data: bytes, source: Hashable | None = None) -> list[DeskAction]:
+    def hear(self, station: int, data: bytes, now_s: float) -> list[DeskAction]:
         """What the ground station at that place says; never raises on anything received."""
         actions: list[DeskAction] = []
-        for frame in self._framers[station].feed(data, source):
+        for frame in self._framers[station].feed(data):
             raw = frame.message
             if raw is None or raw.get_type() not in ("COMMAND_LONG", "COMMAND_INT"):
                 continue
             if raw.target_component == ONBOARD_COMPUTER:
-                actions += self._on_command(station, raw)
+                actions += self._on_command(station, raw, now_s)
         return actions
 
-    def _on_command(self, station: int, raw: Any) -> list[DeskAction]:
+    def _on_command(self, station: int, raw: Any, now_s: float) -> list[DeskAction]:
         wish = WISHES.get(raw.command)
         ours = raw.target_system in (self._system, _EVERYBODY)
         if not (ours or wish is StationWish.ABORT):
             return []
         sender = (raw.get_srcSystem(), raw.get_srcComponent())
-        asked = _Asked(station, raw.command, sender if ours else None)
+        asked = _OpenWish(station, raw.command, sender if ours else None)
         if wish is None:
             return self._acknowledge(asked, mavlink.MAV_RESULT_UNSUPPORTED)
         if raw.get_type() == "COMMAND_INT":
             return self._acknowledge(asked, mavlink.MAV_RESULT_COMMAND_LONG_ONLY)
         if not self._heeds:
             return self._acknowledge(asked, mavlink.MAV_RESULT_DENIED, _OFF)
-        if wish is StationWish.ABORT and raw.param1 not in (ASK, CONFIRM):
-            why = "abort: param1 is 1 to ask for it and 2 to confirm it"
-            return self._acknowledge(asked, mavlink.MAV_RESULT_DENIED, why)
+        if wish is StationWish.ABORT and raw.param1 != CONFIRM:
+            return self._ask_abort(asked, raw.param1, now_s)
+        if wish is StationWish.ABORT and now_s > self._may_confirm_until_s(station):
+            result, why = mavlink.MAV_RESULT_TEMPORARILY_REJECTED, "abort: ask first, then confirm"
+            return self._acknowledge(asked, result, why)
         if len(self._asked) >= _MOST_ASKED:
             return self._acknowledge(asked, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)
         self._n_asked += 1
         self._asked[self._n_asked] = asked
-        confirmed = wish is StationWish.ABORT and raw.param1 == CONFIRM
-        return [StationAsked(self._n_asked, wish, confirmed)]
+        return [StationAsked(self._n_asked, wish)]
 
-    def _acknowledge(self, asked: _Asked, result: int, reason: str = "") -> list[DeskAction]:
+    def _ask_abort(self, asked: _OpenWish, step: float, now_s: float) -> list[DeskAction]:
+        if step != ASK:
+            why = "abort: param1 is 1 to ask for it and 2 to confirm it"
+            return self._acknowledge(asked, mavlink.MAV_RESULT_DENIED, why)
+        self._abort_asked_s[asked.station] = now_s
+        why = "abort asked for: confirm it, or nothing happens"
+        return self._acknowledge(asked, mavlink.MAV_RESULT_ACCEPTED, why)
+
+    def _may_confirm_until_s(self, station: int) -> float:
+        return self._abort_asked_s[station] + CONFIRM_INTERVALS * self._interval_s
+
+    def _acknowledge(self, asked: _OpenWish, result: int, reason: str = "") -> list[DeskAction]:
         told: list[DeskAction] = []
         if asked.sender is not None:
             ack = mavlink.MAVLink_command_ack_message(asked.command, result, 0, 0, *asked.sender)

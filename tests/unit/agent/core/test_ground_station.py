@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import pytest
 
-from agent.core.ground_station import CONFIRM_S
 from agent.core.interface import Action, Held, Hold, Prepare, Ready, Return, VehicleReady
 from agent.core.states import AgentState
 from agent.core.station_words import (
@@ -27,10 +26,10 @@ DONE, NOT_NOW, DENIED = StationVerdict
 
 
 def ask(
-    agent: LoneAgent, wish: StationWish, mission_s: float | None = None, *, confirmed: bool = False
+    agent: LoneAgent, wish: StationWish, mission_s: float | None = None
 ) -> tuple[StationVerdict, list[Action]]:
     """The answer to a wish, and all that came of it."""
-    actions = agent.happen(StationAsked(3, wish, confirmed), mission_s)
+    actions = agent.happen(StationAsked(3, wish), mission_s)
     (answer,) = (action for action in actions if isinstance(action, AnswerStation))
     assert answer.number == 3
     assert (answer.verdict is DONE) or answer.reason
@@ -97,17 +96,12 @@ def test_one_that_was_sent_home_takes_no_further_part() -> None:
     assert ask(agent, RESUME, 3.0)[0] is DENIED
 
 
-@pytest.mark.parametrize(
-    ("wish", "confirmed"), [(RESUME, False), (RETURN, False), (ABORT, True)], ids=str
-)
-def test_what_the_operator_holds_neither_goes_on_nor_home(
-    wish: StationWish, confirmed: bool
-) -> None:
+@pytest.mark.parametrize("wish", [RESUME, RETURN, ABORT])
+def test_what_the_operator_holds_neither_goes_on_nor_home(wish: StationWish) -> None:
     agent = on_its_way()
-    ask(agent, ABORT, 1.0)
     tell(agent, CommandKind.HOLD, 2.0)
 
-    verdict, actions = ask(agent, wish, 3.0, confirmed=confirmed)
+    verdict, actions = ask(agent, wish, 3.0)
 
     assert (verdict, orders(actions)) == (DENIED, [])
     assert agent.core.state is AgentState.PAUSED
@@ -120,19 +114,13 @@ def test_the_operator_lets_go_on_what_a_ground_station_holds() -> None:
     assert [type(order) for order in orders(tell(agent, CommandKind.RESUME, 3.0))] == [Prepare]
 
 
-def test_an_abort_counts_once_it_is_confirmed_in_time() -> None:
-    agent = on_its_way()
+def test_an_abort_brings_it_home() -> None:
+    verdict, actions = ask(on_its_way(), ABORT, 2.0)
 
-    assert ask(agent, ABORT, 1.0, confirmed=True)[0] is NOT_NOW
-    verdict, actions = ask(agent, ABORT, 2.0)
-    assert (verdict, orders(actions)) == (DONE, [])
-    late = ask(agent, ABORT, 2.1 + CONFIRM_S, confirmed=True)
-    assert (late[0], orders(late[1])) == (NOT_NOW, [])
-    ask(agent, ABORT, 20.0)
-    verdict, actions = ask(agent, ABORT, 20.0 + CONFIRM_S, confirmed=True)
+    (order,) = orders(actions)
     assert verdict is DONE
-    assert [type(order) for order in orders(actions)] == [Return]
-    assert ask(agent, ABORT, 60.0, confirmed=True)[0] is DONE, "as it was wished"
+    assert isinstance(order, Return)
+    assert order.reason == "aborted at a ground station"
 
 
 def test_a_vehicle_whose_battery_was_changed_may_start_again(script: Script) -> None:

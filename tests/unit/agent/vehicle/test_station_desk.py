@@ -22,7 +22,15 @@ from agent.core.station_words import (
 )
 from agent.vehicle.framing import TextJoiner
 from agent.vehicle.signing import Signing, SigningKey
-from agent.vehicle.station_desk import WISHES, DeskAction, StationDesk, TellStation
+from agent.vehicle.station_desk import (
+    ASK,
+    CONFIRM,
+    CONFIRM_INTERVALS,
+    WISHES,
+    DeskAction,
+    StationDesk,
+    TellStation,
+)
 from swarm.protocol.uav_messages import StatusPhase
 from tests.support.mavlink_frames import frame
 
@@ -40,6 +48,10 @@ def command(number: int, param1: float = 0.0, system: int = 2, component: int = 
     rest = (0.0,) * 6
     message = mavlink.MAVLink_command_long_message(system, component, number, 0, param1, *rest)
     return frame(message, **STATION)
+
+
+def heard(at: StationDesk, station: int, data: bytes, now_s: float = 0.0) -> list[DeskAction]:
+    return at.hear(station, data, now_s)
 
 
 def told(actions: list[DeskAction]) -> list[Any]:
@@ -75,10 +87,11 @@ def text(actions: list[DeskAction]) -> str:
 def test_each_action_is_a_wish_and_is_answered(number: int, wish: StationWish, system: int) -> None:
     at = desk()
 
-    (asked,) = at.hear(0, command(number, 1.0, system))
+    heard(at, 0, command(31014, ASK))
+    (asked,) = heard(at, 0, command(number, CONFIRM, system))
 
     assert isinstance(asked, StationAsked)
-    assert (asked.wish, asked.confirmed) == (wish, False)
+    assert asked.wish is wish
     answer = at.tell(AnswerStation(asked.number, StationVerdict.DONE), 0.0)
     assert results(answer) == [(number, mavlink.MAV_RESULT_ACCEPTED)]
     assert all(message.get_srcSystem() == 2 for message in told(answer))
@@ -96,7 +109,7 @@ def test_what_is_not_done_is_acknowledged_with_a_reason(
     verdict: StationVerdict, result: int
 ) -> None:
     at = desk()
-    (asked,) = at.hear(0, command(31010))
+    (asked,) = heard(at, 0, command(31010))
     assert isinstance(asked, StationAsked)
 
     answer = at.tell(AnswerStation(asked.number, verdict, "it flies home"), 0.0)
@@ -105,23 +118,40 @@ def test_what_is_not_done_is_acknowledged_with_a_reason(
     assert text(answer) == "it flies home"
 
 
-def test_an_abort_says_which_step_it_is_and_concerns_everybody() -> None:
+def test_an_abort_concerns_everybody_who_hears_it() -> None:
     at = desk()
 
-    (asked,) = at.hear(0, command(31014, 2.0, system=7))
+    assert results(heard(at, 0, command(31014, ASK, system=7))) == []
+    (asked,) = heard(at, 0, command(31014, CONFIRM, system=7))
     assert isinstance(asked, StationAsked)
-    assert (asked.wish, asked.confirmed) == (StationWish.ABORT, True)
+    assert asked.wish is StationWish.ABORT
     answer = at.tell(AnswerStation(asked.number, StationVerdict.DONE), 0.0)
     assert results(answer) == [], "system 7 answers"
+
+
+def test_an_abort_counts_once_its_station_has_confirmed_it_in_time() -> None:
+    at = desk(stations=2)
+    too_soon = [(31014, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)]
+    asks, confirms = command(31014, ASK), command(31014, CONFIRM)
+
+    assert results(heard(at, 0, confirms, 0.0)) == too_soon
+    assert results(heard(at, 0, asks, 1.0)) == [(31014, mavlink.MAV_RESULT_ACCEPTED)]
+    assert results(heard(at, 1, confirms, 2.0)) == too_soon, "another has asked"
+    assert results(heard(at, 0, confirms, 1.1 + CONFIRM_INTERVALS)) == too_soon
+    heard(at, 0, asks, 20.0)
+    for _ in range(2):  # its answer may be lost
+        (asked,) = heard(at, 0, confirms, 20.0 + CONFIRM_INTERVALS)
+        assert isinstance(asked, StationAsked)
     for step in (0.0, 3.0, math.nan):
-        assert results(at.hear(0, command(31014, step))) == [(31014, mavlink.MAV_RESULT_DENIED)]
+        actions = heard(at, 0, command(31014, step))
+        assert results(actions) == [(31014, mavlink.MAV_RESULT_DENIED)]
 
 
 @pytest.mark.parametrize("number", list(WISHES))
 def test_unless_told_to_nothing_is_heeded(number: int) -> None:
     at = desk(heeds=False)
 
-    actions = at.hear(0, command(number, 1.0))
+    actions = heard(at, 0, command(number, 1.0))
 
     assert results(actions) == [(number, mavlink.MAV_RESULT_DENIED)]
     assert "--station-actions" in text(actions)
@@ -131,8 +161,8 @@ def test_other_commands_to_this_component_are_not_supported() -> None:
     at = desk()
     takeoff = mavlink.MAVLink_command_int_message(2, 191, 0, 31010, 0, 0, 0, 0, 0, 0, 0, 0, 0)
 
-    assert results(at.hear(0, command(176))) == [(176, mavlink.MAV_RESULT_UNSUPPORTED)]
-    assert results(at.hear(0, frame(takeoff, **STATION))) == [
+    assert results(heard(at, 0, command(176))) == [(176, mavlink.MAV_RESULT_UNSUPPORTED)]
+    assert results(heard(at, 0, frame(takeoff, **STATION))) == [
         (31010, mavlink.MAV_RESULT_COMMAND_LONG_ONLY)
     ]
 
@@ -153,18 +183,18 @@ HARMLESS = [
 
 @pytest.mark.parametrize("data", HARMLESS)
 def test_nothing_else_means_anything(data: bytes) -> None:
-    assert desk().hear(0, data) == []
+    assert heard(desk(), 0, data) == []
 
 
 @given(st.binary(max_size=400))
 def test_any_bytes_are_survived_and_ask_for_nothing(data: bytes) -> None:
-    assert not any(isinstance(action, StationAsked) for action in desk().hear(0, data))
+    assert not any(isinstance(action, StationAsked) for action in heard(desk(), 0, data))
 
 
 def test_wishes_that_nobody_answers_are_bounded() -> None:
     at = desk()
 
-    actions = [action for _ in range(40) for action in at.hear(0, command(31010))]
+    actions = [action for _ in range(40) for action in heard(at, 0, command(31010))]
 
     assert sum(isinstance(action, StationAsked) for action in actions) == 16
     assert set(results(actions)) == {(31010, mavlink.MAV_RESULT_TEMPORARILY_REJECTED)}
@@ -172,17 +202,19 @@ def test_wishes_that_nobody_answers_are_bounded() -> None:
 
 def test_the_file_for_qgroundcontrol_has_each_action() -> None:
     file = Path(__file__).parents[4] / "deploy/ground-stations/qgroundcontrol-actions.json"
-    told = json.loads(file.read_text())
+    contents = json.loads(file.read_text())
 
-    assert (told["version"], told["fileType"]) == (1, "MavlinkActions")
-    for action in told["actions"]:
+    at = desk()
+    assert (contents["version"], contents["fileType"]) == (1, "MavlinkActions")
+    for action in contents["actions"]:
         assert set(action) <= {"label", "description", "mavCmd", "compId", "param1"}
         data = command(action["mavCmd"], action.get("param1", 0.0), component=action["compId"])
-        (asked,) = desk().hear(0, data)
-        assert isinstance(asked, StationAsked)
-        assert action["label"].lower().startswith(asked.wish.value)
-        assert asked.confirmed is action["label"].endswith("confirm")
-    assert {action["mavCmd"] for action in told["actions"]} == set(WISHES)
+        wish = WISHES[action["mavCmd"]]
+        assert action["label"].lower().startswith(wish.value)
+        actions = heard(at, 0, data)
+        asked = [each.wish for each in actions if isinstance(each, StationAsked)]
+        assert asked == ([] if action["label"] == "Abort: ask" else [wish])
+    assert {action["mavCmd"] for action in contents["actions"]} == set(WISHES)
 
 
 # -- keys -------------------------------------------------------------------------------------
@@ -198,11 +230,11 @@ def test_with_a_key_only_what_is_signed_with_it_is_heeded_and_once() -> None:
     other = SigningKey(bytes(range(1, 33)))
     good = signed(command(31010))
 
-    assert at.hear(0, command(31010)) == []
-    assert at.hear(0, signed(command(31010), other)) == []
-    assert at.hear(0, signed(command(31010), late_s=90.0)) == []
-    assert [type(action) for action in at.hear(0, good)] == [StationAsked]
-    assert at.hear(0, good) == []
+    assert heard(at, 0, command(31010)) == []
+    assert heard(at, 0, signed(command(31010), other)) == []
+    assert heard(at, 0, signed(command(31010), late_s=90.0)) == []
+    assert [type(action) for action in heard(at, 0, good)] == [StationAsked]
+    assert heard(at, 0, good) == []
     assert at.distrusted == 4
 
 
@@ -268,7 +300,7 @@ def test_who_stops_or_leaves_is_told_of_as_a_warning() -> None:
 def test_texts_of_any_length_come_whole(length: int) -> None:
     at = desk()
     words = "a" * length
-    (asked,) = at.hear(0, command(31010))
+    (asked,) = heard(at, 0, command(31010))
     assert isinstance(asked, StationAsked)
 
     assert text(at.tell(AnswerStation(asked.number, StationVerdict.DENIED, words), 0.0)) == words
@@ -276,7 +308,7 @@ def test_texts_of_any_length_come_whole(length: int) -> None:
 
 def test_only_who_asked_is_answered() -> None:
     at = desk(stations=2)
-    (asked,) = at.hear(1, command(31010))
+    (asked,) = heard(at, 1, command(31010))
     assert isinstance(asked, StationAsked)
 
     actions = at.tell(AnswerStation(asked.number, StationVerdict.DENIED, "no"), 0.0)
