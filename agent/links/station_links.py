@@ -128,4 +128,5 @@ class _Ear:
         pass
 
     def received(self, data: bytes, source: Hashable | None = None) -> None:
+        del source  # the socket hears that station alone
         self._heard(self._number, data)
