@@ -171,14 +171,13 @@ class Airway:
         if self._shared is None or not claimed or not isinstance(order, GoTo | Return):
             self._actions.append(OrderVehicle(order))
             if isinstance(order, Hold | Prepare) and self._shared is not None:
-                self._wish = self._aside = None
                 self._stops = False
-                if self._way is not None and not self._way.flies:
-                    self._way = self._hover()
+                self._drop_wish()
             return
         corners = self._corners(order)
         if corners is None:
             self._actions.append(OrderVehicle(order))
+            self._drop_wish()
             return
         # Home, a vehicle goes down to its own layer above its start by itself.
         own_height |= isinstance(order, Return) and not order.land
@@ -191,6 +190,12 @@ class Airway:
             self._stands_at = self._stands_at or self._fleet.standing()
         if self._moves and self._aloft and not self._stops:
             self._stop()
+
+    def _drop_wish(self) -> None:
+        """Nothing is asked for any more."""
+        self._wish = self._aside = None
+        if self._way is not None and not self._way.flies:
+            self._way = self._hover()
 
     def _corners(self, order: GoTo | Return) -> tuple[Point, ...] | None:
         """Of its way in the own layer; None: it leads nowhere."""
@@ -331,10 +336,7 @@ class Airway:
             end_s = self.sortie_end_s()
             if task is None and self._aloft and self._fleet.must_go(wish, end_s, self._retry_s):
                 self._actions.append(LogLine("flies where it may meet others", {}))
-                here = self._hover()
-                ways = self._fleet.ways(air, wish, here.shift_m, aside=False, waits=False)
-                shift_m, corners = next(ways)
-                path = shifted_path(here.path_enu_m[0], corners, shift_m, wish.end_enu_m)
+                shift_m, path = self._fleet.emptiest_way(air, wish, self._hover(), self._claims())
                 self._way = ClaimedWay(self._number(), path, shift_m=shift_m)
                 self._depart(wish)
                 self._wish = None
@@ -351,9 +353,12 @@ class Airway:
             self._ask(air, wish, again=rival is not None)
 
     def _ask(self, air: SharedAir, wish: Wish, *, again: bool) -> None:
-        """Ask for the nearest layer in which nobody is in the way, else for one to wait for."""
+        """Ask for the nearest layer in which nobody is in the way, else for one to wait for.
+
+        Of those it takes one through few slabs, where it needs few grants and keeps few from going.
+        """
         claims, expired, here = self._claims(), self._fleet.expired(), self._hover()
-        fallback: ClaimedWay | None = None
+        fallback: tuple[int, ClaimedWay] | None = None
         for shift_m, corners in self._fleet.ways(
             air, wish, here.shift_m, aside=wish is self._aside, waits=self._wish is not None
         ):
@@ -370,11 +375,13 @@ class Airway:
             if air.is_free(self._uav, array, claims, expired, grounded=grounded):
                 self._request(wish, asked, again=again)
                 return
-            fallback = fallback or asked
+            slabs = len(air.slabs.asked(array, grounded=grounded))
+            if fallback is None or slabs < fallback[0]:
+                fallback = slabs, asked
         if wish is self._aside:
             self._aside = None
         elif fallback is not None and (again or not wish.asked):
-            self._request(wish, fallback, again=again)
+            self._request(wish, fallback[1], again=again)
 
     def _request(self, wish: Wish, asked: ClaimedWay, *, again: bool) -> None:
         """Ask for that, unless it is asked for already, and nobody is to be let in before."""

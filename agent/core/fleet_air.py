@@ -10,14 +10,18 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from agent.core.interface import GoTo, Return
 from agent.core.mission_view import MissionView, Peers
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
-from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
+from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, air_of_brief, is_home, strength
+from swarm.separation.shifted import shifted_path
+from swarm.separation.slabs import layer_spacing_m, nearest_m
 
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end, or is changed [s]."""
@@ -112,13 +116,52 @@ class FleetAir:
         (east_m, north_m, up_m), *_ = wish.corners_enu_m
         others_m = [shift_m for shift_m in shifts_m if abs(shift_m - now_shift_m) > 1e-6]
         yield from ((shift_m, wish.corners_enu_m[:1]) for shift_m in others_m)
-        if waits or zones_in_force(self._replica):
+        if waits:
             return
         for away in _ASIDE_M:
             for turn in range(_DIRECTIONS):
                 angle, away_m = 2.0 * math.pi * turn / _DIRECTIONS, away * air.slabs.separation_m
                 there = east_m + away_m * math.cos(angle), north_m + away_m * math.sin(angle), up_m
-                yield from ((shift_m, (wish.corners_enu_m[0], there)) for shift_m in shifts_m)
+                if self._is_clear(wish.corners_enu_m[0], there):
+                    yield from ((shift_m, (wish.corners_enu_m[0], there)) for shift_m in shifts_m)
+
+    def _is_clear(self, begin_enu_m: Point, end_enu_m: Point) -> bool:
+        """Whether no zone is between the two, at whatever height."""
+        if not zones_in_force(self._replica):
+            return True
+        problem = self._mission_view.board.field_problem
+        network = None if problem is None else problem.network
+        return network is not None and network.is_clear(begin_enu_m, end_enu_m)
+
+    def emptiest_way(
+        self, air: SharedAir, wish: Wish, here: ClaimedWay, claims: Mapping[str, Claim]
+    ) -> tuple[float, tuple[Point, ...]]:
+        """Shift and path of the way home that keeps farthest from all that others take.
+
+        Above the highest layer only where none below keeps a separation.
+        """
+        expired = self.expired()
+        taken = [
+            path
+            for uav in claims
+            if uav != self._uav and uav not in expired
+            for path in (air.wanted(uav, air.way(uav, claims)),)
+            if len(path)
+        ]
+        ways = list(self.ways(air, wish, here.shift_m, aside=False, waits=False))
+        step_m = layer_spacing_m(air.slabs.separation_m)
+        higher_m = max(shift_m for shift_m, _ in ways) + step_m
+        if not wish.fixed:
+            ways += [(higher_m, ways[-1][1]), (higher_m + step_m, ways[-1][1])]
+        best: tuple[float, float, tuple[Point, ...]] | None = None
+        for shift_m, corners in ways:
+            path = shifted_path(here.path_enu_m[0], corners, shift_m, wish.end_enu_m)
+            mine = np.array(path)
+            near_m = min((nearest_m(mine, other, 0.5) for other in taken), default=math.inf)
+            room_m = min(near_m, air.slabs.separation_m + 0.5)
+            if len(path) <= MOST_CORNERS and (best is None or room_m > best[0]):
+                best = room_m, shift_m, path
+        return (0.0, here.path_enu_m) if best is None else best[1:]
 
     def must_go(self, wish: Wish, sortie_end_s: float, retry_s: float) -> bool:
         """Whether it would fall if it waited any longer: none of the reserve is left for that.

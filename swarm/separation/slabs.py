@@ -7,6 +7,7 @@ least, so whoever keeps the paths of each slab apart, as seen from above, keeps 
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -160,6 +161,23 @@ def least_flat_m(ones_m: FloatArray, others_m: FloatArray) -> float:
         _ends_from(others_m, ones_m),
     ]
     return float(min(near_m))
+
+
+def nearest_m(one_enu_m: Path, other_enu_m: Path, step_m: float) -> float:
+    """Least distance of two paths in space [m], to half of ``step_m``."""
+    begin, end = other_enu_m, other_enu_m
+    if len(other_enu_m) > 1:
+        begin, end = other_enu_m[:-1], other_enu_m[1:]
+    way = end - begin
+    length2 = (way * way).sum(axis=1)
+    places = [one_enu_m[:1]]
+    for here, there in itertools.pairwise(one_enu_m):
+        count = 1 + math.ceil(math.dist(here, there) / step_m)
+        places.append(np.linspace(here, there, count)[1:])
+    points = np.concatenate(places)[:, None]
+    along = ((points - begin) * way).sum(axis=2) / np.where(length2 > 0.0, length2, 1.0)
+    nearest = begin + np.clip(along, 0.0, 1.0)[:, :, None] * way
+    return float(np.sqrt(((points - nearest) ** 2).sum(axis=2).min()))
 
 
 def _flat_pieces(path_enu_m: Path, low_m: float, high_m: float) -> FloatArray:

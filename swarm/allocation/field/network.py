@@ -270,6 +270,12 @@ class FieldNetwork:
         out_m, free = self._airspace.concerning(low_m, high_m).way_out_m(place_m[:, :2])
         return None if free[0] else (float(out_m[0, 0]), float(out_m[0, 1]), float(place_m[0, 2]))
 
+    def is_clear(self, begin_enu_m: Sequence[float], end_enu_m: Sequence[float]) -> bool:
+        """Whether straight on from place to place [m] leads through no zone, however high."""
+        planner = self._airspace.concerning(-np.inf, np.inf)
+        begin_m, end_m = (np.array([place[:2]]) for place in (begin_enu_m, end_enu_m))
+        return bool(planner.clear(begin_m, end_m)[0] and planner.free(end_m)[0])
+
     def _kind_of(self, uav: int) -> tuple[FlightModel, LegNetwork]:
         return self._kinds[int(self.kind[uav])]
 
