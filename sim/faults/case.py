@@ -42,6 +42,8 @@ FIRST_IN_FIELD: Final = 2_000_000
 """Of the seeds whose missions have all of the field's constraints."""
 FIRST_WITH_SEPARATION: Final = 3_000_000
 """Of the seeds whose UAVs are to keep a distance as well."""
+FIRST_OF_MANY: Final = 4_000_000
+"""Of the seeds with separation whose fleets are larger."""
 CLOCK_PPM: Final = 100.0
 AREA_M: Final = 120.0
 KINDS_OF_TASK: Final = ("look", "lift")
@@ -72,9 +74,9 @@ class Case:
     """Flown instead of one drawn from the seed."""
 
     def __post_init__(self) -> None:
-        drawn = self.mission is None
-        if drawn and not (1 <= self.uavs <= MOST_UAVS and 1 <= self.tasks <= MOST_TASKS):
-            raise ValueError(f"1..{MOST_UAVS} UAVs and 1..{MOST_TASKS} tasks")
+        drawn, (uavs, tasks) = self.mission is None, most_of(self.seed)
+        if drawn and not (1 <= self.uavs <= uavs and 1 <= self.tasks <= tasks):
+            raise ValueError(f"1..{uavs} UAVs and 1..{tasks} tasks")
         if self.bug and self.bug not in BUGS:
             raise ValueError(f"{self.bug!r} is none of {', '.join(BUGS)}")
 
@@ -85,8 +87,7 @@ class Case:
         if self.seed >= FIRST_IN_FIELD:
             apart = self.seed >= FIRST_WITH_SEPARATION
             draw = random_separated_mission if apart else random_field_mission
-            most = MOST_UAVS, MOST_TASKS
-            return draw(self.seed, most, self.uavs, self.tasks, self.popups)
+            return draw(self.seed, most_of(self.seed), self.uavs, self.tasks, self.popups)
         return _random_mission(self.seed, self.uavs, self.tasks, self.popups)
 
     def processes(self) -> tuple[str, ...]:
@@ -104,6 +105,11 @@ class CaseResult:
     """The first invariant that did not hold."""
     steps: int
     world: World
+
+
+def most_of(seed: int) -> tuple[int, int]:
+    """How many UAVs and tasks the mission of that seed may have."""
+    return (40, 60) if seed >= FIRST_OF_MANY else (MOST_UAVS, MOST_TASKS)
 
 
 def quick_plan(mission: Mission, method: str, seed: int) -> Plan:

@@ -57,7 +57,8 @@ def soak(
     They are random themselves, and played in virtual time. Every case follows from its seed. One
     that fails is made as small as possible, printed, and written to a file that --replay plays
     again. Seeds from 1000000 on have accelerations, those from 2000000 on all of the field's
-    constraints: batteries, bases, zones, wind, windows. Exit status 0: every invariant held.
+    constraints: batteries, bases, zones, wind, windows; from 3000000 on UAVs keep apart, and from
+    4000000 on there are up to 40 of them. Exit status 0: every invariant held.
 
     Examples:
         swarm soak --seeds 10000

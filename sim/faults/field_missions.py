@@ -28,26 +28,31 @@ _OF_RESERVE = 0.6
 
 @lru_cache(maxsize=64)
 def random_field_mission(
-    seed: int, most: tuple[int, int], uavs: int, tasks: int, popups: int
+    seed: int,
+    most: tuple[int, int],
+    uavs: int,
+    tasks: int,
+    popups: int,
+    area_m: float = AREA_M,
 ) -> Mission:
-    """A mission of ``uavs`` and ``tasks`` out of the ``most`` of either."""
+    """A mission of ``uavs`` and ``tasks`` out of the ``most`` of either, in such a square."""
     rng = stream(seed, "field")
-    zones = tuple(_zone(rng, number) for number in range(int(rng.integers(0, 4))))
+    zones = tuple(_zone(rng, number, area_m) for number in range(int(rng.integers(0, 4))))
     margin_m = float(rng.choice([0.0, 2.0]))
     wind = tuple(rng.uniform(-2.0, 2.0, 2).tolist()) if rng.random() < 0.5 else (0.0, 0.0)
     planner = Airspace(zones, margin_m + _ENOUGH_M).concerning(-1e6, 1e6)
     bases = tuple(
         Base(
             BaseId(f"b{number}"),
-            _point(rng, planner, AREA_M),
+            _point(rng, planner, area_m),
             swap_s=float(rng.uniform(0.0, 10.0)),
             slots=None if rng.random() < 0.2 else int(rng.integers(1, 3)),
         )
         for number in range(int(rng.integers(1, 3)))
     )
     most_uavs, most_tasks = most
-    fleet = [_uav(rng, planner, number) for number in range(most_uavs)]
-    board = [_task(rng, planner, number, popups) for number in range(most_tasks)]
+    fleet = [_uav(rng, planner, number, area_m) for number in range(most_uavs)]
+    board = [_task(rng, planner, number, popups, area_m) for number in range(most_tasks)]
     return Mission(
         f"field-{seed}",
         HORIZON_S,
@@ -76,7 +81,7 @@ def fair_drain_frac(mission: Mission, uav: str) -> float:
     return min(1.0, _OF_RESERVE * me.reserve_frac * me.endurance_s / farthest_s)
 
 
-def _uav(rng: np.random.Generator, planner: PathPlanner, number: int) -> Uav:
+def _uav(rng: np.random.Generator, planner: PathPlanner, number: int, area_m: float) -> Uav:
     success = {kind: float(rng.uniform(0.3, 1.0)) for kind in KINDS_OF_TASK}
     if rng.random() < 0.3:
         success[str(rng.choice(KINDS_OF_TASK))] = 0.0
@@ -85,7 +90,7 @@ def _uav(rng: np.random.Generator, planner: PathPlanner, number: int) -> Uav:
     limited, hasty, sails = (rng.random() < share for share in (0.8, 0.4, 0.5))
     return Uav(
         UavId(f"u{number}"),
-        _point(rng, planner, AREA_M / 2.0),
+        _point(rng, planner, area_m / 2.0),
         speed_m_s,
         success,
         survival,
@@ -97,8 +102,10 @@ def _uav(rng: np.random.Generator, planner: PathPlanner, number: int) -> Uav:
     )
 
 
-def _task(rng: np.random.Generator, planner: PathPlanner, number: int, popups: int) -> Task:
-    place = _point(rng, planner, AREA_M)
+def _task(
+    rng: np.random.Generator, planner: PathPlanner, number: int, popups: int, area_m: float
+) -> Task:
+    place = _point(rng, planner, area_m)
     path = _line(rng, planner, place) if rng.random() < 0.25 else ()
     appears_s = float(rng.uniform(1.0, 25.0))
     appears_s = appears_s if number < popups else 0.0
@@ -120,9 +127,9 @@ def _task(rng: np.random.Generator, planner: PathPlanner, number: int, popups: i
     )
 
 
-def _zone(rng: np.random.Generator, number: int) -> Zone:
+def _zone(rng: np.random.Generator, number: int, area_m: float) -> Zone:
     """A convex one, somewhere in the area."""
-    middle_m = rng.uniform(0.15 * AREA_M, 0.85 * AREA_M, 2)
+    middle_m = rng.uniform(0.15 * area_m, 0.85 * area_m, 2)
     angle_rad = np.sort(rng.uniform(0.0, 2.0 * np.pi, 5))
     reach_m = float(rng.uniform(6.0, 16.0))
     corners = middle_m + reach_m * np.column_stack([np.cos(angle_rad), np.sin(angle_rad)])

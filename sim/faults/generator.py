@@ -10,7 +10,7 @@ import numpy as np
 
 from coordinator.planner.field_plan import is_field
 from coordinator.planner.plan import make_plan
-from sim.faults.case import MOST_TASKS, MOST_UAVS, Case, CaseResult, play
+from sim.faults.case import Case, CaseResult, most_of, play
 from sim.faults.field_missions import fair_drain_frac
 from sim.faults.schedule import (
     FIELD_KINDS,
@@ -53,12 +53,12 @@ def kinds_of(text: str, source: str) -> tuple[DisturbanceKind, ...]:
 def random_case(
     seed: int, kinds: Collection[DisturbanceKind] = tuple(DisturbanceKind), bug: str = ""
 ) -> Case:
-    """A fleet of 2 to 6 UAVs with 3 to 15 tasks, and 1 to 6 things that go wrong."""
-    rng = stream(seed, "case")
-    tasks = int(rng.integers(3, MOST_TASKS + 1))
+    """A fleet of 2 to 6 UAVs with 3 to 15 tasks, or more, and 1 to 6 things that go wrong."""
+    rng, (most_uavs, most_tasks) = stream(seed, "case"), most_of(seed)
+    tasks = int(rng.integers(3, most_tasks + 1))
     case = Case(
         seed=seed,
-        uavs=int(rng.integers(2, MOST_UAVS + 1)),
+        uavs=int(rng.integers(2, most_uavs + 1)),
         tasks=tasks,
         popups=int(rng.integers(0, 1 + tasks // 3)),
         topology=Topology(str(rng.choice([each.value for each in Topology]))),

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from functools import lru_cache
 
-from sim.faults.field_missions import random_field_mission
+from sim.faults.field_missions import AREA_M, random_field_mission
 from sim.world.engine import stream
 from swarm.model import Mission
 from swarm.separation.fleet_layers import fleet_layers_m
 from swarm.separation.slabs import planned_apart_m
+
+_IN_AREA = 10.0
+"""UAVs for which the usual area is large enough; for more it grows with their number."""
 
 
 @lru_cache(maxsize=64)
@@ -21,7 +25,8 @@ def random_separated_mission(
     From 5 to 12 m are kept, with two to five layers for all; more if the starts ask for them.
     """
     rng = stream(seed, "separation")
-    whole = random_field_mission(seed, most, *most, popups)
+    area_m = AREA_M * math.sqrt(max(1.0, most[0] / _IN_AREA))
+    whole = random_field_mission(seed, most, *most, popups, area_m)
     separation_m = round(float(rng.uniform(5.0, 12.0)), 1)
     lowest_m, layers = round(float(rng.uniform(15.0, 40.0)), 1), int(rng.integers(2, 6))
     for count in range(layers, layers + most[0]):
