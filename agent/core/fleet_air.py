@@ -21,7 +21,7 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, air_of_brief, is_home, strength
 from swarm.separation.shifted import shifted_path
-from swarm.separation.slabs import layer_spacing_m, nearest_m
+from swarm.separation.slabs import nearest_m, planned_apart_m
 
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end, or is changed [s]."""
@@ -149,7 +149,7 @@ class FleetAir:
             if len(path)
         ]
         ways = list(self.ways(air, wish, here.shift_m, aside=False, waits=False))
-        step_m = layer_spacing_m(air.slabs.separation_m)
+        step_m = planned_apart_m(air.slabs.separation_m)
         higher_m = max(shift_m for shift_m, _ in ways) + step_m
         if not wish.fixed:
             ways += [(higher_m, ways[-1][1]), (higher_m + step_m, ways[-1][1])]
