@@ -79,7 +79,7 @@ class LiedTo:
     def motion(self, uav: str) -> tuple[Point, Point]:
         """Where that UAV truly is, and how it moves."""
         pilot = self.fleet.vehicles[uav].pilot()
-        return pilot.position_enu_m(self.now_s), pilot.velocity_enu_m_s(self.now_s)
+        return pilot.position_enu_m(self.now_s), pilot.flight.motion.velocity_enu_m_s(self.now_s)
 
     def word(
         self,

@@ -107,6 +107,7 @@ def test_it_flies_on_without_its_agent_and_the_next_one_makes_another_bridge() -
 def test_a_cut_link_lets_nothing_through_until_it_is_over(silent_s: float, *, lost: bool) -> None:
     flight = Flight().prepared()
     flight.vehicle.order(GoTo(1, (100.0, 0.0, 10.0)), VehicleReady())
+    flight.queue.run(20.01)  # nothing is under way
     flight.vehicle.cut(silent_s)
     flight.heard.clear()
     flight.queue.run(20.0 + silent_s - 0.1)
