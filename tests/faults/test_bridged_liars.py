@@ -27,7 +27,8 @@ from tests.support.bridged_fleet import KINDS
 from tests.support.keyring import Keyring
 
 LIAR = "u2"
-EVERY_S = 0.25
+FIRST_S, EVERY_S = 0.137, 0.25
+"""Between two instants at which vehicles say something, which looking at them would take away."""
 UP_M = 20.0
 STILL = (0.0, 0.0, 0.0)
 FAST, FAR = 1e6, 1e8
@@ -52,8 +53,9 @@ class LiedTo:
         """All words of where somebody is, as the bus carries them."""
         self.networks: list[SealedNetwork] = []
         self._lies, self._number = lies, count(1)
+        self._places: dict[str, Point] = {}
         self.fleet = CrossingFleet(monkeypatch, *kind, MISSION, network=self._join)
-        self.fleet.at(EVERY_S, self._lie)
+        self.fleet.at(FIRST_S, self._lie)
 
     def _join(self, queue: EventQueue) -> SealedNetwork:
         seal_of, ear = functools.cache(self.keys.seal), self.keys.seal("dashboard")
@@ -77,9 +79,11 @@ class LiedTo:
         return self.fleet.world.queue.now_s()
 
     def motion(self, uav: str) -> tuple[Point, Point]:
-        """Where that UAV truly is, and how it moves."""
-        pilot = self.fleet.vehicles[uav].pilot()
-        return pilot.position_enu_m(self.now_s), pilot.flight.motion.velocity_enu_m_s(self.now_s)
+        """Where that UAV truly is, and by how much it has moved since the last lie."""
+        east, north, up = self.fleet.vehicles[uav].pilot().position_enu_m(self.now_s)
+        before = self._places.get(uav, (east, north, up))
+        self._places[uav] = east, north, up
+        return (east, north, up), (east - before[0], north - before[1], up - before[2])
 
     def word(
         self,
@@ -124,9 +128,9 @@ def jumping(fleet: LiedTo) -> Iterator[tuple[str, bytes]]:
 
 def staying_before(fleet: LiedTo) -> Iterator[tuple[str, bytes]]:
     """Before one of them wherever that turns to; it says in between that it has landed."""
-    (east, north, up), velocity = fleet.motion("u0")
-    speed_m_s = math.hypot(*velocity)
-    ahead = tuple(each / speed_m_s for each in velocity) if speed_m_s > 0.3 else (1.0, 0.0, 0.0)
+    (east, north, up), moved_m = fleet.motion("u0")
+    far_m = math.hypot(*moved_m)
+    ahead = tuple(each / far_m for each in moved_m) if far_m > 0.1 else (1.0, 0.0, 0.0)
     place = (east + 11.0 * ahead[0], north + 11.0 * ahead[1], up + 11.0 * ahead[2])
     yield fleet.signed(fleet.word(place, airborne=int(fleet.now_s) % 20 != 0))
 

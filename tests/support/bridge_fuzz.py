@@ -254,8 +254,8 @@ class Episode:
             case 11:
                 return self._zones()
             case 12 | 13:
-                speed_m_s = random.choice((None, 2.0, 0.0, -1.0, math.nan, math.inf))
-                return GiveWay(self._corners(), random.random() < 0.3, speed_m_s)
+                pace_m_s = random.choice((None, 2.0, 0.0, -1.0, math.nan, math.inf))
+                return GiveWay(self._corners(), random.random() < 0.3, pace_m_s)
             case _:
                 via = self._place() if random.random() < 0.5 else None
                 path = self._corners() if random.random() < 0.5 else ()
