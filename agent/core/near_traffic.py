@@ -107,6 +107,8 @@ class NearTraffic(AgentPart):
         self._stamps: dict[str, Stamp] = {}
         self._ordered = False
         """Whether it was ordered something since the last decision."""
+        self._waited_s: float | None = None
+        """When it last waited for somebody before it took off or landed."""
         self._decide_at_s = -math.inf
         self._say_at_s = -math.inf
 
@@ -237,12 +239,19 @@ class NearTraffic(AgentPart):
         if not self._turn.is_awaited or rules is None or picture is None:
             return
         before = self._turn.goes_before(own.position_enu_m, picture, rules, now_s)
+        self._blame(before, picture, now_s)
         if before is not None:
             self._announcer.explain(f"waits for {before} before it takes off")
             return
         self._turn.end()
         self._is_let_go, self._say_at_s = True, now_s
         self._actions.append(OrderVehicle(_BY_ITSELF))
+
+    def _blame(self, uav: str | None, picture: TrafficPicture, now_s: float) -> None:
+        """It waits on the ground or above its start for that one; None: for nobody."""
+        if uav is not None and self._waited_s is not None:
+            picture.blame(uav, now_s, min(now_s - self._waited_s, 2.0 * BEACON_S))
+        self._waited_s = None if uav is None else now_s
 
     def _heed_brief(self) -> bool:
         """Whether there is a distance to keep."""
@@ -335,7 +344,9 @@ class NearTraffic(AgentPart):
         if not homebound or math.dist(place[:2], path[-1][:2]) > _NEAR_HOME_M:
             return False
         above = (*path[-1][:2], max(each[2] for each in (place, *path)))
-        return who_is_in(above, path[-1][2], picture, rules, now_s) is not None
+        below = who_is_in(above, path[-1][2], picture, rules, now_s)
+        self._blame(below, picture, now_s)
+        return below is not None
 
     def _explain(self, advice: Advice) -> None:
         if advice.maneuver is Maneuver.KEEP and not advice.braked:

@@ -314,6 +314,11 @@ class TrafficPicture:
         track = self._tracks.get(uav)
         return None if track is None else track.word.position_enu_m
 
+    def blame(self, uav: str, now_s: float, seconds: float) -> None:
+        """It has kept this UAV from taking off, or from landing, for so long."""
+        if (track := self._tracks.get(uav)) is not None:
+            track.blame(now_s, seconds)
+
     def forget(self, uav: str) -> None:
         """It has landed, or left."""
         if (track := self._tracks.pop(uav, None)) is not None:
