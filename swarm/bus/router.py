@@ -10,11 +10,15 @@ import contextlib
 import json
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
 
 import zenoh
-from zenoh.handlers import Callback
+from zenoh.handlers import Callback, RingChannel
 
 from swarm.bus.admission import RateLimiter
+from swarm.bus.bundled_hearing import MOST_WAITING
+from swarm.bus.bundles import ANY_BUNDLE, BUNDLE_S, BUNDLED, Bundler
 from swarm.bus.config import RouterConfig
 from swarm.bus.zenoh_session import close_session, open_session, session_config, session_config_file
 from swarm.identity import Identity, Role, Roster
@@ -26,6 +30,12 @@ from swarm.protocol.messages import SignedRoster, roster_message
 from swarm.protocol.seal import UnacceptableError, seal_of
 from swarm.runtime.errors import BusError
 from swarm.runtime.log import get_logger
+from swarm.runtime.writer_thread import WriterThread
+
+if TYPE_CHECKING:
+    from zenoh.handlers import Handler
+
+    _Ring = zenoh.Subscriber[Handler[zenoh.Sample]]
 
 LOOK_S = 1.0
 """How often the folder is looked into [wall s]."""
@@ -174,6 +184,7 @@ class Router:
         self._rosters = rosters
         self._session = session
         self._closed = False
+        self._bundles = WriterThread("bundles")  # a hung client holds a call up
         self.endpoints = endpoints
         """Where it really listens, one per address, ports filled in."""
 
@@ -183,6 +194,14 @@ class Router:
         Raises:
             BusError: it was itself revoked, or cannot listen any more.
         """
+        bundling = asyncio.get_running_loop().create_task(self._bundle())
+        try:
+            await self._serve()
+        finally:
+            bundling.cancel()
+            await asyncio.gather(bundling, return_exceptions=True)
+
+    async def _serve(self) -> None:
         rosters = self._rosters
         if rosters is None:
             await asyncio.Event().wait()
@@ -201,6 +220,7 @@ class Router:
         """Stop serving; returns within 2 s whatever the network."""
         if not self._closed:
             self._closed = True
+            self._bundles.close(0.0)
             close_session(self._session, limit_s=CLOSE_LIMIT_S)
 
     def _hear(self, rosters: RosterKeeper) -> None:
@@ -231,6 +251,28 @@ class Router:
         self._session.liveliness().declare_subscriber(
             f"{root}/alive/*", Callback(on_saying, indirect=False)
         )
+
+    async def _bundle(self) -> None:
+        """Say together what UAVs of large fleets say; see `swarm.bus.bundles`."""
+        loop = asyncio.get_running_loop()
+        session: zenoh.Session | None = None
+        heard: list[_Ring] = []
+        bundler = Bundler(str(self._session.zid()))
+        while True:
+            if session is not self._session:  # the first one, or it was opened anew
+                session = self._session
+                heard = [_ring(session, key_expr) for key_expr in (*BUNDLED, ANY_BUNDLE)]
+            with contextlib.suppress(zenoh.ZError):  # it is opened anew just now
+                for ring in heard:
+                    for _ in range(MOST_WAITING):
+                        if (sample := ring.try_recv()) is None:
+                            break
+                        bundler.hear(str(sample.key_expr), sample.payload.to_bytes(), loop.time())
+                for key, payload in bundler.take(loop.time()):
+                    self._bundles.submit(
+                        partial(_say, session, key, payload), size_bytes=len(payload)
+                    )
+            await asyncio.sleep(BUNDLE_S)
 
     def _tell(self, key: str, data: bytes) -> None:
         with contextlib.suppress(zenoh.ZError):
@@ -301,6 +343,18 @@ def _zenoh_config(config: RouterConfig, listen: tuple[str, ...]) -> zenoh.Config
     # Only there a router says which port it got when asked for any.
     zenoh_config.insert_json5("adminspace/enabled", "true")
     return zenoh_config
+
+
+def _ring(session: zenoh.Session, key_expr: str) -> _Ring:
+    """What others say there, kept by Zenoh until it is asked for."""
+    ring: RingChannel[zenoh.Sample] = RingChannel(MOST_WAITING)
+    return session.declare_subscriber(key_expr, ring, allowed_origin=zenoh.Locality.REMOTE)
+
+
+def _say(session: zenoh.Session, key: str, payload: bytes) -> None:
+    with contextlib.suppress(zenoh.ZError):  # it is opened anew just now
+        block, remote = zenoh.CongestionControl.BLOCK, zenoh.Locality.REMOTE
+        session.put(key, payload, congestion_control=block, allowed_destination=remote)
 
 
 def _as_before(listen: tuple[str, ...], endpoints: tuple[str, ...]) -> tuple[str, ...]:

@@ -19,15 +19,17 @@ import weakref
 from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
 
 import zenoh
-from zenoh.handlers import Callback, RingChannel
+from zenoh.handlers import Callback
 
+from swarm.bus.bundled_hearing import GatheredSubscriptions
 from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology
 from swarm.bus.port import (
     Answer,
     Inbox,
+    LinkDown,
+    LinkUp,
     Query,
     Sample,
     TokenGone,
@@ -51,17 +53,11 @@ from swarm.runtime.errors import BusError
 from swarm.runtime.log import get_logger
 from swarm.runtime.writer_thread import WriterThread
 
-if TYPE_CHECKING:
-    from zenoh.handlers import Handler
-
-
 REPLY_WITHIN_S = 10.0
 """A query nobody has answered for this long is given up: who asked waits no longer."""
 MOST_ANSWERS = 8
 """To one question on one key: honest ones are one for each process of that name, and each may be
 as long as a bus carries."""
-GATHERED_MOST = 8192
-"""Samples of one subscription that wait to be gathered."""
 FLUSH_LIMIT_S = 0.7
 """How long closing waits for what is published; a blocked link gives up after 0.5 s."""
 WORD_AFTER_S = 1.5
@@ -182,10 +178,9 @@ class ZenohBus:
         self._closed = False
         self._subscribed: dict[str, tuple[bool, bool]] = {}
         """By key expression, whether the latest of each key is enough, and whether to gather."""
-        self._subscribers: dict[str, zenoh.Subscriber[Any]] = {}
-        """By key expression; the writer's thread alone looks at them."""
-        self._gathered: dict[str, zenoh.Subscriber[Handler[zenoh.Sample]]] = {}
-        """Those of them whose samples wait until they are gathered."""
+        self._subscribers: dict[str, zenoh.Subscriber[None]] = {}
+        """By key expression, but for what is gathered; the writer's thread alone looks at them."""
+        self._gathered = GatheredSubscriptions(session, self._call)
         self._watched: set[str] = set()
         self._served: set[str] = set()
         self._tokens: dict[str, zenoh.LivelinessToken | None] = {}
@@ -222,33 +217,52 @@ class ZenohBus:
             congestion_control=how,
             allowed_destination=zenoh.Locality.REMOTE,
         )
+        self._gathered.said(key, bytes(payload))
         self._writer.submit(partial(self._try, put), size_bytes=len(payload), spare=not reliable)
 
     def subscribe(self, key_expr: str, *, latest: bool = False, gathered: bool = False) -> None:
         """Receive a `Sample` for everything others publish on ``key_expr``."""
         self._check_open()
         check_key_expr(key_expr)
-        as_before = self._subscribed.get(key_expr, (False, not gathered))[1] is gathered
+        before = self._subscribed.get(key_expr)
         self._subscribed[key_expr] = latest, gathered  # before the first sample can arrive
-        if not as_before:
-            self._call(partial(self._declare_subscriber, key_expr, gathered=gathered))
+        if before is not None and before[1] is gathered:
+            return
+        # The new one first: what comes twice meanwhile does no harm.
+        if gathered:
+            self._gathered.add(key_expr)
+        else:
+            self._call(partial(self._declare_subscriber, key_expr))
+        if before is not None:
+            self._withdraw(key_expr, gathered=before[1])
 
     def gather(self) -> None:
         """Hand over what waits; never for longer than there was room for."""
         self._check_open()
-        for key_expr, subscriber in list(self._gathered.items()):
-            with contextlib.suppress(zenoh.ZError):  # undeclared just now
-                for _ in range(GATHERED_MOST):
-                    sample = subscriber.try_recv()
-                    if sample is None:
-                        break
-                    self._on_sample(key_expr, sample)
+        now_s = self._loop.time()
+        for key_expr, (key, payload) in self._gathered.take(now_s):
+            self._offer(key_expr, Sample(key, payload))
+        if self._gathered.judge(now_s, self._links.changes) and self._links.linked:
+            # As after a link that was down: others may have said what did not come here.
+            self._inbox.offer_threadsafe(LinkDown())
+            self._call(lambda: self._inbox.offer_threadsafe(LinkUp()))
+
+    def relies_on_bundles(self, mission: str) -> bool:
+        """Whether claims and outcomes of that mission are heard by bundles alone."""
+        return self._gathered.relies_on_bundles(mission)
 
     def unsubscribe(self, key_expr: str) -> None:
         """Receive nothing more by that very subscription."""
         self._check_open()
-        if self._subscribed.pop(key_expr, None) is not None:
-            self._call(partial(self._undeclare_subscriber, key_expr))
+        how = self._subscribed.pop(key_expr, None)
+        if how is not None:
+            self._withdraw(key_expr, gathered=how[1])
+
+    def _withdraw(self, key_expr: str, *, gathered: bool) -> None:
+        if gathered:
+            self._gathered.remove(key_expr)
+        else:
+            self._call(lambda: self._subscribers.pop(key_expr).undeclare())
 
     def declare_token(self, key: str) -> None:
         """Hold a liveliness token on ``key``."""
@@ -347,25 +361,12 @@ class ZenohBus:
         except zenoh.ZError as fault:
             get_logger("swarm.bus").warning("the bus refused a call", problem=plain_error(fault))
 
-    def _declare_subscriber(self, key_expr: str, *, gathered: bool) -> None:
-        """In place of the one before, if there is one: what comes twice meanwhile does no harm."""
-        before, remote = self._subscribers.get(key_expr), zenoh.Locality.REMOTE
-        if gathered:
-            # Kept by Zenoh, without a call into Python for each one.
-            ring: RingChannel[zenoh.Sample] = RingChannel(GATHERED_MOST)
-            kept = self._session.declare_subscriber(key_expr, ring, allowed_origin=remote)
-            self._subscribers[key_expr] = self._gathered[key_expr] = kept
-        else:
-            call = _direct(partial(self._on_sample, key_expr))
-            told = self._session.declare_subscriber(key_expr, call, allowed_origin=remote)
-            self._subscribers[key_expr] = told
-            self._gathered.pop(key_expr, None)
-        if before is not None:
-            before.undeclare()
-
-    def _undeclare_subscriber(self, key_expr: str) -> None:
-        self._gathered.pop(key_expr, None)
-        self._subscribers.pop(key_expr).undeclare()
+    def _declare_subscriber(self, key_expr: str) -> None:
+        call = _direct(partial(self._on_sample, key_expr))
+        remote = zenoh.Locality.REMOTE
+        self._subscribers[key_expr] = self._session.declare_subscriber(
+            key_expr, call, allowed_origin=remote
+        )
 
     def _declare_token(self, key: str) -> None:
         # Kept, or it would be undeclared when it is collected.
@@ -375,9 +376,11 @@ class ZenohBus:
 
     def _on_sample(self, key_expr: str, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.PUT and not self._closed:
-            event = Sample(str(sample.key_expr), sample.payload.to_bytes())
-            if (how := self._subscribed.get(key_expr)) is not None:
-                self._inbox.offer_threadsafe(event, latest=how[0])
+            self._offer(key_expr, Sample(str(sample.key_expr), sample.payload.to_bytes()))
+
+    def _offer(self, key_expr: str, event: Sample) -> None:
+        if (how := self._subscribed.get(key_expr)) is not None:
+            self._inbox.offer_threadsafe(event, latest=how[0])
 
     def _on_token(self, sample: zenoh.Sample) -> None:
         key = str(sample.key_expr)

@@ -193,6 +193,16 @@ class LinkWatch:
         self._changes = 0
         self._look_again_s = 0.0
 
+    @property
+    def linked(self) -> bool:
+        """Whether there is a transport to anybody."""
+        return self._linked
+
+    @property
+    def changes(self) -> int:
+        """How many transports have come and gone so far."""
+        return self._changes
+
     def on_event(self, event: zenoh.TransportEvent) -> None:
         """A transport to one of the others came or went."""
         other = str(event.transport.zid)
