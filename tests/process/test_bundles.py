@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Callable
+from pathlib import Path
 
 import pytest
 
@@ -11,8 +12,11 @@ from swarm.bus.bundles import BUNDLE_S, bundle_key, packed
 from swarm.bus.config import BusConfig, ClientTopology
 from swarm.bus.port import LinkDown, LinkUp, Sample
 from swarm.bus.zenoh_bus import ZenohBus, open_zenoh_bus
+from swarm.identity import load_identity
+from swarm.identity.founding import found_authority
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.timing import UNSTRETCHED_UAVS
+from swarm.runtime.clock import unix_s
 from tests.process.router_processes import router
 
 pytestmark = pytest.mark.process
@@ -94,4 +98,42 @@ def test_who_hears_bundles_no_more_hears_claims_by_themselves() -> None:
                 bus.close()
 
     with router("--listen", "tcp/127.0.0.1:0") as (_, endpoint):
+        asyncio.run(scenario(endpoint))
+
+
+def test_with_keys_bundles_are_heard_of_routers_and_of_nobody_else(tmp_path: Path) -> None:
+    folder = tmp_path / "keys"
+    found_authority(folder, "m", ["u1", "u2"], now_s=unix_s(), coordinators=1, routers=2)
+
+    async def scenario(endpoint: str) -> None:
+        def seat(name: str) -> BusConfig:
+            topology = ClientTopology((endpoint.replace("tcp/", "tls/"),))
+            return BusConfig(topology, identity=load_identity(folder / name))
+
+        # Another router may say what many have said to it.
+        carrier, liar, hearer = [
+            await open_zenoh_bus(seat(name)) for name in ("router-2", "u1", "u2")
+        ]
+        try:
+            hearer.subscribe(bundle_key("m", "*"))
+            heard: dict[str, int] = {}
+
+            def is_heard() -> bool:
+                for number in range(UNSTRETCHED_UAVS + 5):
+                    carrier.publish(KEYS.claim(f"u{number}"), b"said")
+                liar.publish(bundle_key("m", "liar"), packed(1, ()))
+                for event in hearer.inbox.take():
+                    if isinstance(event, Sample):
+                        heard[event.key] = heard.get(event.key, 0) + 1
+                return max(heard.values(), default=0) >= 5
+
+            await until(hearer, [], is_heard)
+            assert len(heard) == 1
+            assert bundle_key("m", "liar") not in heard
+        finally:
+            for bus in (carrier, liar, hearer):
+                bus.close()
+
+    options = ("--keys", str(folder / "router"), "--listen", "tls/127.0.0.1:0")
+    with router(*options) as (_, endpoint):
         asyncio.run(scenario(endpoint))
