@@ -40,6 +40,8 @@ MOST_EACH: Final = 200
 """Statements of one UAV that wait to be bundled, so that no flood costs others their words."""
 MOST_WRITERS: Final = 4096
 """UAVs of one mission whose statements are bundled."""
+MOST_MISSIONS: Final = 64
+"""Whose statements one router bundles."""
 BUNDLED: Final = ("swarm/*/uav/*/claim", "swarm/*/uav/*/outcome/*")
 ANY_BUNDLE: Final = "swarm/*/bundle/*"
 
@@ -134,6 +136,8 @@ class Bundler:
             self._hear_bundle(key, now_s)
             return
         mission, uav = whose
+        if mission not in self._missions and len(self._missions) >= MOST_MISSIONS:
+            return
         collected = self._missions.setdefault(mission, _Collected())
         if uav not in collected.writers:
             if len(collected.writers) >= MOST_WRITERS:
