@@ -58,8 +58,8 @@ from swarm.runtime.state_exchange import StateExchange, draw_nonce
 TURN = 20
 """Events from the bus between two looks at everything else."""
 GATHER_S = 0.05
-"""In a large fleet: wall time between two looks at what has come of claims, outcomes and board; with
-the time that a router collects them, less than claims may be contested on any network."""
+"""In a large fleet: wall time between two looks at what has come of claims, outcomes and board.
+With the time that a router collects them, less than claims may be contested on any network."""
 GATHER_SETTLED_S = 0.5
 """The same while nothing follows from them at once."""
 
