@@ -131,8 +131,10 @@ class ScaleRun:
 
     def as_json(self) -> dict[str, Any]:
         """Everything, with what follows from it."""
-        derived = ("agent_cpu_frac", "agent_share_mean_bytes", "said_hz", "heard_hz")
-        derived += ("besides_hz", "claims_per_decision")
+        derived = (
+            *("agent_cpu_frac", "agent_share_mean_bytes", "said_hz", "heard_hz"),
+            *("besides_hz", "claims_per_decision"),
+        )
         return {
             **asdict(self),
             **{name: getattr(self, name) for name in derived},
