@@ -86,7 +86,7 @@ class ZenohRosGraph:
     """The node, as long as its session is open; use `open_ros_graph`."""
 
     def __init__(self, session: zenoh.Session, domain_id: int, name: str) -> None:
-        self.types = MessageTypes()
+        self._types = MessageTypes()
         self._session = session
         self._node = RosNode(domain_id, name, str(session.zid()))
         self._writer = WriterThread("ros2")
@@ -95,11 +95,6 @@ class ZenohRosGraph:
         self._numbers = 0
         self._tokens: list[zenoh.LivelinessToken] = []
         self._call(lambda: self._tokens.append(self._declared(self._node.token)))
-
-    @property
-    def unsent(self) -> int:
-        """Messages that were dropped as the network was too slow."""
-        return self._writer.dropped
 
     def say(self, message: RosMessage) -> None:
         """Publish a message, stamped with this moment."""
@@ -111,7 +106,7 @@ class ZenohRosGraph:
             fields = {**fields, "header": {**fields["header"], "stamp": stamp}}
         topic = self._topics.get(message.topic) or self._begun(message)
         topic.said += 1
-        payload = self.types.encode(message.type, fields)
+        payload = self._types.encode(message.type, fields)
         attachment = Attachment(topic.said, stamp_ns, topic.endpoint.gid).encode()
 
         def put() -> None:
@@ -167,7 +162,7 @@ class ZenohRosGraph:
 
     def _endpoint(self, kind: EntityKind, name: str, typ: str) -> RosEndpoint:
         self._numbers += 1
-        return self._node.endpoint(self._numbers, kind, name, typ, self.types.hash_of(typ))
+        return self._node.endpoint(self._numbers, kind, name, typ, self._types.hash_of(typ))
 
     def _declared(self, token: str) -> zenoh.LivelinessToken:
         return self._session.liveliness().declare_token(token)
@@ -180,11 +175,11 @@ class ZenohRosGraph:
             query.drop()
             return None
         try:
-            asked = self.types.decode(f"{service.type}_Request", query.payload.to_bytes())
+            asked = self._types.decode(f"{service.type}_Request", query.payload.to_bytes())
         except MalformedError:
             asked = None
         key = str(query.key_expr)
-        return _Call(service, asked, key, query, told, self.types, self._writer)
+        return _Call(service, asked, key, query, told, self._types, self._writer)
 
     def _call(
         self, call: Callable[[], object], *, size_bytes: int = 0, must_run: bool = True

@@ -78,7 +78,8 @@ class RosReader:
         finally:
             client.close()
         assert answer is not None, f"{name} has not answered"
-        return {field: getattr(answer, field) for field in answer.__dataclass_fields__}
+        fields = [name for name in answer.__dataclass_fields__ if not name.startswith("_")]
+        return {name: getattr(answer, name) for name in fields}
 
     def made(self, typ: str, *values: Any) -> Any:
         """A message for a request."""
@@ -192,5 +193,7 @@ def main(port: int, definitions: Path, withdrawn: list[str]) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(int(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:])), flush=True)
-    ZenohSession.get_instance().close()
+    try:
+        print(json.dumps(main(int(sys.argv[1]), Path(sys.argv[2]), sys.argv[3:])), flush=True)
+    finally:
+        ZenohSession.get_instance().close()  # else it would not end
