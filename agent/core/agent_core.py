@@ -177,6 +177,7 @@ class AgentCore(AgentPart):
         if not self._machine.has_ended:
             if self._stall_detector.late(now_s):
                 self._sync.held_up(now_s)
+                self._tasking.disturbed()
             self._handle(event, now_s)
             if not self._machine.has_ended:
                 self._advance(now_s)

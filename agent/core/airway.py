@@ -42,12 +42,14 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, strength
-from swarm.separation.shifted import hover_shift_m, nominal, shifted_path
+from swarm.separation.shifted import hover_shift_m, length_m, nominal, shifted_path
 
 STOP_LEG = 0
 """Of orders that are this module's own; those of the core are numbered from 1."""
 GIVES_UP_S = 10.0
 """How long a UAV waits for a way to a task before it looks for another task [s]."""
+_LONGER_M = 0.5
+"""A way is as it was reckoned, to so much [m]."""
 _ASIDE_PATIENCE = 4.0
 """How long it waits for its way aside, in intervals at which it asks anew."""
 
@@ -71,6 +73,8 @@ class Airway:
         self._actions = actions
         self.when_departed: Callable[[], None] = lambda: None
         """Is told when the vehicle is sent off after a wait."""
+        self.when_detoured: Callable[[], None] = lambda: None
+        """Is told when it is sent off by a longer way than was reckoned with."""
         self.sortie_end_s: Callable[[], float] = lambda: math.inf
         """By when the UAV must have landed, its reserve kept [s mission time]."""
         self._fleet = FleetAir(uav, replica, mission_view, peers)
@@ -441,6 +445,8 @@ class Airway:
         self._stands_at = self._lifts_enu_m = None
         self._own_height = wish.own_height
         self._way = replace(way, flies=True, grounded=False)
+        if length_m(path) > length_m(wish.corners_enu_m) + _LONGER_M:
+            self.when_detoured()
         if isinstance(order, GoTo):
             self._flown_leg = order.leg
             sent: GoTo | Return = replace(order, position_enu_m=path[-1], via_enu_m=path[1:-1])

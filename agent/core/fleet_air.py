@@ -5,7 +5,6 @@ Leaves out: asking, granting and setting off (agent.core.airway).
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -20,7 +19,7 @@ from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, air_of_brief, is_home, strength
-from swarm.separation.shifted import shifted_path
+from swarm.separation.shifted import length_m, shifted_path
 from swarm.separation.slabs import nearest_m, planned_apart_m
 
 ENDLESS_S = 1800.0
@@ -176,8 +175,7 @@ class FleetAir:
             return self._mission_view.now_s - wish.since_s > LAST_RESORT_S
         way_s = wish.takes_s
         if way_s is None:
-            length_m = sum(math.dist(a, b) for a, b in itertools.pairwise(wish.corners_enu_m))
-            way_s = length_m / me.speed_m_s
+            way_s = length_m(wish.corners_enu_m) / me.speed_m_s
         falls_s = sortie_end_s + _OF_RESERVE * me.reserve_frac * me.endurance_s
         return self._mission_s + way_s + retry_s > falls_s
 

@@ -59,6 +59,7 @@ class Flights(AgentPart):
         self.meter = FlightMeter(context)
         """Is told of every leg."""
         context.airway.when_departed = self.meter.depart_late
+        context.airway.when_detoured = self.meter.disturb
         context.airway.sortie_end_s = lambda: self.meter.sortie.end_s
         self._zones: tuple[ZoneSpec, ...] = ()
         self._home: HomeFlight | None = None

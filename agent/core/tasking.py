@@ -117,7 +117,7 @@ class Tasking(AgentPart, ABC):
         self._flights.meter.introduce(limits)
 
     def disturbed(self) -> None:
-        """The vehicle gives way to another: the time of this leg tells nothing."""
+        """The vehicle gives way, or nobody saw it arrive: the time of this leg tells nothing."""
         self._flights.meter.disturb()
 
     def begin(self, now_s: float) -> None:

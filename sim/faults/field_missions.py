@@ -48,7 +48,7 @@ def random_field_mission(
             swap_s=float(rng.uniform(0.0, 10.0)),
             slots=None if rng.random() < 0.2 else int(rng.integers(1, 3)),
         )
-        for number in range(int(rng.integers(1, 3)))
+        for number in range(int(rng.integers(1, 3)) * max(1, round((area_m / AREA_M) ** 2)))
     )
     most_uavs, most_tasks = most
     fleet = [_uav(rng, planner, number, area_m) for number in range(most_uavs)]

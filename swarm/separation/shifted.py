@@ -7,6 +7,7 @@ straight to that height at the end.
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
@@ -40,6 +41,11 @@ def shifted_path(
         if math.dist(point, kept[-1]) > 1e-6:
             kept.append(point)
     return tuple(kept)
+
+
+def length_m(path_enu_m: Sequence[Point]) -> float:
+    """Of all its pieces together [m]."""
+    return sum(math.dist(a, b) for a, b in itertools.pairwise(path_enu_m))
 
 
 def nominal(place_enu_m: Point, way: ClaimedWay, *, own_height: bool) -> Point:
