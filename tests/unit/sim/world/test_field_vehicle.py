@@ -111,6 +111,21 @@ def test_corners_are_flown_through_without_stopping() -> None:
     assert flight.reports[1:] == [(7.0, Arrived(1))]
 
 
+def test_between_its_layer_and_the_height_of_a_task_it_stops_in_no_time() -> None:
+    """Where it stops is not in its layer, and it does not fly as if it had to get there."""
+    high = Task(TaskId("t0"), (30.0, 0.0, 0.0), 1.0, height_m=70.0)
+    flight = Flight(replace(MISSION, tasks=(high,)))
+    flight.order(GoTo(1, (30.0, 0.0, 70.0), task="t0"))
+    flight.wait(4.0)
+    telemetry = flight.vehicle.telemetry()
+    assert telemetry is not None
+    assert LAYER_M + 10.0 < telemetry.position_enu_m[2] < 60.0
+    flight.order(GoTo(2, telemetry.position_enu_m))
+    flight.wait(4.0 + 1e-6)
+
+    assert flight.told(Arrived(2)) == pytest.approx(4.0)
+
+
 def test_with_an_acceleration_the_whole_path_is_flown_from_rest_to_rest() -> None:
     flight = Flight(replace(MISSION, uavs=(replace(UAV, acceleration_m_s2=2.0),)))
     flight.order(GoTo(1, above(30.0, 40.0), via_enu_m=(above(30.0),)))

@@ -14,7 +14,9 @@ from swarm.separation.slabs import (
     Slabs,
     apart,
     keeper_rows,
+    keeper_seats,
     least_flat_m,
+    nearest_m,
     shared_layers_m,
     start_layers,
 )
@@ -148,3 +150,34 @@ def test_a_start_too_crowded_for_the_layers_is_refused() -> None:
 )
 def test_every_slab_has_a_keeper(slabs: int, uavs: int, rows: tuple[int, ...]) -> None:
     assert keeper_rows(slabs, uavs) == rows
+
+
+@pytest.mark.parametrize(
+    ("slabs", "uavs", "seats"),
+    [
+        (2, 3, ((0, 1, 2), (1, 2, 0))),
+        (2, 9, ((0, 3, 6), (1, 4, 7))),
+        (3, 3, ((0,), (1,), (2,))),
+        (1, 2, ((0,),)),
+    ],
+)
+def test_three_keep_a_slab_where_not_everybody_can_have_one(
+    slabs: int, uavs: int, seats: tuple[tuple[int, ...], ...]
+) -> None:
+    assert keeper_seats(slabs, uavs) == seats
+    assert all(len(set(each)) == len(each) for each in keeper_seats(slabs, uavs))
+
+
+def test_the_nearest_of_two_paths_in_space_is_found_to_half_a_step() -> None:
+    rng = np.random.default_rng(5)
+    for _ in range(50):
+        one, other = path_of(rng, SLABS), path_of(rng, SLABS)
+        places = [
+            np.concatenate([np.linspace(a, b, 200) for a, b in itertools.pairwise(each)])
+            if len(each) > 1
+            else each
+            for each in (one, other)
+        ]
+        sampled_m = float(np.linalg.norm(places[0][:, None] - places[1][None], axis=2).min())
+        found_m = nearest_m(one, other, 0.5)
+        assert sampled_m - 1.0 <= found_m <= sampled_m + 0.25 + 1e-9
