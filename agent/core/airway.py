@@ -97,6 +97,9 @@ class Airway:
         self._granted: dict[str, int] = {}
         self._keeps: tuple[int, ...] = ()
         """Seats that it has taken over."""
+        self._whole: ClaimedWay | None = None
+        """What it says of its way, with what it grants."""
+        self._made_of: tuple[object, ...] = ()
         self._stands_at: tuple[str, BaseStage] | None = None
         """Where it stands until its way up is granted."""
         self._lifts_enu_m: Point | None = None
@@ -259,8 +262,11 @@ class Airway:
             if claim.task is not None:
                 departs_s = self._mission_view.mission_s(self._mission_view.now_s)
                 claim = replace(claim, departs_s=departs_s)
-        way = replace(self._told_way, grants=dict(self._granted), keeps=self._keeps)
-        return replace(claim, way=way)
+        made_of = self._told_way, self._granted, self._keeps
+        if made_of != self._made_of:  # most words are about something else
+            self._made_of = made_of
+            self._whole = replace(made_of[0], grants=dict(self._granted), keeps=self._keeps)
+        return claim if claim.way is self._whole else replace(claim, way=self._whole)
 
     def settle(self, now_s: float) -> list[Refused]:
         """What follows from the claims: whom to grant, where to go, and what is told of it.
