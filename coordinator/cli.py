@@ -116,7 +116,7 @@ def plan(
 
     from json import dumps
 
-    from coordinator.core.heights import height_warning
+    from coordinator.core.heights import height_warnings
     from coordinator.mission_view.area_report import areas_as_json
     from coordinator.planner.exact import ProblemTooLargeError
     from coordinator.planner.options import BOUND_S, after_time, first_of, whole_limit
@@ -127,7 +127,7 @@ def plan(
 
     check_plan_options(method, plot, firmware, None if bound else bound_s)
     mission = load_scenario(scenario)
-    if (warning := height_warning(mission, layers_over(mission.terrain))) is not None:
+    for warning in height_warnings(mission, layers_over(mission.terrain)):
         print(f"warning: {warning}", file=sys.stderr)
     if export is not None:
         from coordinator.export import require_exportable, require_origin
@@ -334,7 +334,7 @@ def coordinator(
         swarm coordinator valley-survey --dashboard 8080
     """
     from coordinator.core.active import CoordinatorCore
-    from coordinator.core.heights import height_warning
+    from coordinator.core.heights import height_warnings
     from coordinator.core.publication import unsayable
     from coordinator.daemon import CoordinatorProcess
     from coordinator.dashboard.access import parse_serve_address
@@ -363,7 +363,7 @@ def coordinator(
     remedy = "leave some out, or make several of it"
     if faults := [Fault(str(scenario), "", what, remedy) for what in unsayable(mission, layers)]:
         raise InputError(*faults)
-    if (warning := height_warning(mission, layers)) is not None:
+    for warning in height_warnings(mission, layers):
         get_logger(COORDINATOR).warning(warning)
 
     def core(memory: Snapshot | None, memory_age_s: float) -> CoordinatorCore:

@@ -100,7 +100,7 @@ def predicted_conflicts(
     if not ones.size:
         return ()
     row_of: dict[int, int] = {}
-    motions = []
+    motions: list[npt.NDArray[np.float64]] = []
     for number in np.union1d(ones, others).tolist():
         row_of[number] = len(motions)
         track = NearbyTrack(words[number], at_s, ages_s[number])

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Self, TextIO
 
 from rich.console import Console
 
-from coordinator.core.heights import height_warning
+from coordinator.core.heights import height_warnings
 from coordinator.terminal.live_view import LiveView
 from sim.fleet.layout import LaunchOptions, flight_layers
 from sim.fleet.run import fly
@@ -65,7 +65,7 @@ class ShownRun:
         for line in () if options.dashboard is None else options.dashboard.lines:
             self._say(line)
         layers = flight_layers(self._mission, options)
-        if (warning := height_warning(self._mission, layers)) is not None:
+        for warning in height_warnings(self._mission, layers):
             self._say(f"warning: {warning}")
 
     async def fly(self, options: LaunchOptions) -> int:

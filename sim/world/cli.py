@@ -92,11 +92,12 @@ def simulate(
         remedy = "name a scenario, such as table-1, or a recording with --from"
         raise InputError(Fault("swarm simulate", "", "nothing to simulate", remedy))
 
+    from coordinator.core.heights import height_warnings
     from coordinator.core.publication import unsayable
     from coordinator.terminal.report import MissionReport
     from sim.world.simulation import recording_simulation, simulate_mission
     from sim.world.uncertainty import Uncertainty
-    from swarm.model.layers import FlightLayers
+    from swarm.model.layers import FlightLayers, layers_over
     from swarm.scenario import load_scenario
 
     check_flight(method, report, record)
@@ -106,6 +107,8 @@ def simulate(
     lines = unsayable(mission, FlightLayers())
     if complaints := [Fault(str(scenario), "", what, remedy) for what in lines]:
         raise InputError(*complaints)
+    for warning in height_warnings(mission, layers_over(mission.terrain)):
+        typer.echo(f"warning: {warning}", err=True)
     if faults is not None:
         if record is not None:
             problem, remedy = "does not go with --faults", "leave one of them out"

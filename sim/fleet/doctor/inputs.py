@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from coordinator.core.heights import height_warning
+from coordinator.core.heights import height_warnings
 from sim.fleet.doctor.field import check_field
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 from swarm.identity import Identity, Role, load_identity
@@ -38,7 +38,7 @@ def check_scenario(path: Path) -> tuple[Mission | None, list[CheckFinding]]:
         found = [warns("scenario", f"{text}, and no origin", remedy)]
     else:
         found = [fine("scenario", f"{text}, D = {mission.horizon_s:g} s")]
-    if (warning := height_warning(mission, layers_over(mission.terrain))) is not None:
+    for warning in height_warnings(mission, layers_over(mission.terrain)):
         problem, _, remedy = warning.partition(": ")
         found.append(warns("height", problem, remedy))
     found += check_field(mission)
