@@ -252,7 +252,13 @@ class Flights(AgentPart):
         if way is None or not self._mission_view.stands:
             return way
         climb_s = self.climb_s
-        return replace(way, duration_s=way.duration_s + climb_s, upright_s=way.upright_s + climb_s)
+        way = replace(way, duration_s=way.duration_s + climb_s, upright_s=way.upright_s + climb_s)
+        if self.ground is None:
+            return way
+        # A vehicle climbs to the height of what it is sent to first; from where a way over a slope
+        # begins, it may go down.
+        begin_enu_m = self._mission_view.in_layer(self._standing_m(place_enu_m))
+        return replace(way, via_enu_m=(begin_enu_m, *way.via_enu_m))
 
     def _widened(self, way: field.Way | None) -> field.Way | None:
         """That way as a vehicle is led that does not fly quite where it is told, to its spot."""
