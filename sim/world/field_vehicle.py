@@ -224,9 +224,17 @@ class FieldVehicle(TracedVehicle):
         if self._flies and self._place_enu_m is not None:
             now_s = self._queue.now_s()
             self._rest(now_s)
-            east_m, north_m, up_m = self._place_enu_m
-            self._touch_down((east_m, north_m, up_m - self._layer_m), now_s)
+            self._touch_down(self._ground_below(self._place_enu_m), now_s)
         self._report(Home())
+
+    def _ground_below(self, place_enu_m: Point) -> Point:
+        """Where it lands from there, which over a base or its start may be in any layer."""
+        east_m, north_m, up_m = place_enu_m
+        known = [base.position_enu_m for base in self._paths.mission.bases]
+        for there in (*known, self._start_enu_m):
+            if math.dist(there[:2], place_enu_m[:2]) <= _SAME_BASE_M:
+                return east_m, north_m, there[2]
+        return east_m, north_m, up_m - self._layer_m
 
     # -- motion -------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ BROKEN_ONCE = {
     3000062: "an agent that was held up took its UAV for slow, and its battery for empty early",
     3000150: "the slab of a lost keeper was shut, and a task in it left undone",
     3000173: "who waited for a slanted way through two slabs kept another from making room",
+    3000182: "who had landed from another layer took off into the air below its own",
     3000192: "a return from the ground left a wish for another way standing",
     3000195: "the last resort led through another UAV",
     3001022: "who left a task's height asked for air far above its layer, and waited in a zone",

@@ -126,6 +126,17 @@ def test_between_its_layer_and_the_height_of_a_task_it_stops_in_no_time() -> Non
     assert flight.told(Arrived(2)) == pytest.approx(4.0)
 
 
+def test_who_lands_from_another_layer_takes_off_into_its_own() -> None:
+    flight = Flight()
+    flight.order(Return("no slot", via_enu_m=(50.0, 0.0, 30.0), land=True))
+    flight.wait(10.0)
+    assert flight.told(Home()) < 10.0
+    flight.order(GoTo(1, above(50.0)))
+    telemetry = flight.vehicle.telemetry()
+    assert telemetry is not None
+    assert telemetry.position_enu_m == pytest.approx(above(50.0))
+
+
 def test_with_an_acceleration_the_whole_path_is_flown_from_rest_to_rest() -> None:
     flight = Flight(replace(MISSION, uavs=(replace(UAV, acceleration_m_s2=2.0),)))
     flight.order(GoTo(1, above(30.0, 40.0), via_enu_m=(above(30.0),)))
