@@ -143,8 +143,8 @@ class CrossingFleet(BridgedFleet):
 # -- what is less than ideal ---------------------------------------------------------------
 
 _LEAVING = (DisturbanceKind.CRASH, DisturbanceKind.HANG, DisturbanceKind.DEADLOCK)
-_SPAN_S = 60.0
-"""Faults begin within this time, in which most of the flying is done."""
+_BEGIN_S, _SPAN_S = 18.0, 45.0
+"""By then all are in the air; faults begin within so long after it, in which they fly and land."""
 _KINDS = (
     *_LEAVING,
     DisturbanceKind.CUT,
@@ -214,14 +214,15 @@ def _roughly(
 
 
 def _faults_with_a_plan(mission: Mission, seed: int) -> tuple[Disturbance, ...]:
-    return random_schedule(seed, _KINDS, mission, _SPAN_S)
+    drawn = random_schedule(seed, _KINDS, mission, _SPAN_S)
+    return tuple(replace(each, at_s=_BEGIN_S + each.at_s) for each in drawn)
 
 
 def _faults_without_a_plan(mission: Mission, seed: int) -> tuple[Disturbance, ...]:
     rng = np.random.default_rng([seed, 73])
     uavs = [str(uav.id) for uav in mission.uavs]
     fails, parted = rng.choice(uavs, 2)
-    at_s, parts_s = rng.uniform(5.0, _SPAN_S, 2).round(2).tolist()
+    at_s, parts_s = (_BEGIN_S + rng.uniform(0.0, _SPAN_S, 2)).round(2).tolist()
     kind = DisturbanceKind(str(rng.choice([DisturbanceKind.CRASH, DisturbanceKind.HANG])))
     memory = RestartMemory.DISK if kind is DisturbanceKind.CRASH else None
     fault = Disturbance(

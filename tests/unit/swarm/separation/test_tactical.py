@@ -260,7 +260,13 @@ LIES: dict[str, Lie] = {
 }
 
 
-@pytest.mark.parametrize("name", LIES)
+BY_DAY = ("jumping", "staying before, with landings in between", "boundless")
+
+
+@pytest.mark.parametrize(
+    "name",
+    [name if name in BY_DAY else pytest.param(name, marks=pytest.mark.slow) for name in LIES],
+)
 def test_a_liar_neither_makes_others_collide_nor_stops_them_for_good(name: str) -> None:
     crowd = Crowd(RULES, CONSTRUCTED["crossing"](), liars=[LIES[name]])
 
