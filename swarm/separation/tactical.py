@@ -23,6 +23,8 @@ from swarm.separation.tactical_motion import (
     least_distance_m,
     least_meeting_m,
     motion_m,
+    round_m,
+    stop_place_m,
 )
 from swarm.separation.tactical_traffic import (
     Grade,
@@ -42,7 +44,7 @@ class Maneuver(Enum):
     SLOW = "slow"
     HOLD = "hold"
     OVER = "over"
-    """It flies on, higher or lower."""
+    """It flies on past another one: higher, lower or, where it can't, round it."""
     ASIDE = "aside"
     """It makes room."""
 
@@ -293,10 +295,11 @@ class TacticalResolver:
     ) -> Iterator[_Option]:
         """What it may do instead of flying on, the least first."""
         speed_m_s, hold = own.speed_m_s, _Option(Maneuver.HOLD, (), own.speed_m_s, "hold")
-        stop_m = self._stop_m(own)
+        moves = own.position_enu_m, own.velocity_enu_m_s
+        stop_m = stop_place_m(*moves, self._rules.reaction_s, self._rules.agility)
         if own.path_enu_m:
             yield _Option(Maneuver.SLOW, own.path_enu_m, _SLOW * speed_m_s, "slow")
-            over = self._over(own, stop_m)
+            over = [*self._over(own, stop_m), *self._round(own, stop_m, others, in_way)]
             if self._has_stood(now_s):
                 yield from over
                 yield hold
@@ -320,6 +323,17 @@ class TacticalResolver:
                 options.append(_Option(Maneuver.OVER, path_m, own.speed_m_s, f"over {label}"))
         return options
 
+    def _round(
+        self, own: OwnFlight, stop_m: Place, others: Sequence[_Other], in_way: str | None
+    ) -> Iterator[_Option]:
+        """Past the one in its way on a side, where it can't fly higher or lower."""
+        for other in others:
+            if other.uav == in_way:
+                sides = round_m(stop_m, other.expected_m[0], self._rules.aside_m)
+                for label, corners in zip(("right", "left"), sides, strict=False):
+                    path_m = (*corners, *own.path_enu_m)
+                    yield _Option(Maneuver.OVER, path_m, own.speed_m_s, f"round {label}")
+
     def _rises(self) -> list[tuple[str, float]]:
         aside_m = self._rules.aside_m
         return [(f"{share:+d}", share * aside_m) for share in (1, -1, 2, -2)]
@@ -342,16 +356,6 @@ class TacticalResolver:
                     stop_m[2],
                 ),
             )
-
-    def _stop_m(self, own: OwnFlight) -> Place:
-        """Where it would stand if it braked."""
-        speed_m_s = math.hypot(*own.velocity_enu_m_s)
-        far_s = self._rules.reaction_s + speed_m_s / (2.0 * self._rules.agility.acceleration_m_s2)
-        east, north, up = (
-            at + far_s * each
-            for at, each in zip(own.position_enu_m, own.velocity_enu_m_s, strict=True)
-        )
-        return east, north, up
 
     def _is_within(self, path_m: Sequence[Place]) -> bool:
         return all(self._rules.low_m <= up <= self._rules.high_m for _, _, up in path_m)

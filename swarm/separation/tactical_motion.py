@@ -21,6 +21,8 @@ STEP_S = 0.25
 """Between two samples of a motion [s]."""
 _REACHED_M = 0.5
 _COLUMN_STEP_M = 1.0
+_BESIDE_M = 1.0
+"""Whoever is that near in the view from above is not flown round: it is above or below."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +106,37 @@ def motion_m(
         vx, vy, vz = vx + ax, vy + ay, vz + az
         places.append((px, py, pz))
     return np.array(places)
+
+
+def stop_place_m(
+    position_m: Place, velocity_m_s: Place, reaction_s: float, agility: Agility
+) -> Place:
+    """Where a UAV that moves so would stand if it were told to brake [m]."""
+    far_s = reaction_s + math.hypot(*velocity_m_s) / (2.0 * agility.acceleration_m_s2)
+    (px, py, pz), (vx, vy, vz) = position_m, velocity_m_s
+    return px + far_s * vx, py + far_s * vy, pz + far_s * vz
+
+
+def round_m(from_m: Place, past_m: FloatArray, aside_m: float) -> list[tuple[Place, Place]]:
+    """Corners right and left past a place, level: so far aside, and then on until beside it.
+
+    Args:
+        from_m: where the way begins [m].
+        past_m: (3,) what is flown round [m].
+        aside_m: how far to a side.
+    """
+    (east_m, north_m, up_m), (to_east_m, to_north_m, _) = from_m, past_m.tolist()
+    length_m = math.hypot(to_east_m - east_m, to_north_m - north_m)
+    if length_m < _BESIDE_M:
+        return []
+    right_m = aside_m * (to_north_m - north_m) / length_m, aside_m * (east_m - to_east_m) / length_m
+    return [
+        (
+            (east_m + side * right_m[0], north_m + side * right_m[1], up_m),
+            (to_east_m + side * right_m[0], to_north_m + side * right_m[1], up_m),
+        )
+        for side in (1.0, -1.0)
+    ]
 
 
 def column_m(place_m: Place, end_up_m: float) -> FloatArray:

@@ -97,6 +97,14 @@ def test_all_arrive_and_nobody_comes_too_near(name: str, loss_frac: float, delay
     assert crowd.nearest_m >= least_m, crowd.told()
 
 
+def test_where_there_is_one_layer_one_that_must_not_move_is_flown_round() -> None:
+    flyers = CONSTRUCTED["past one that must not move"]()
+    crowd = Crowd(replace(RULES, low_m=UP_M - 1.0, high_m=UP_M + 6.0), flyers)
+
+    assert crowd.fly(120.0), crowd.told()
+    assert crowd.nearest_m >= RULES.separation_m - 2.0, crowd.told()
+
+
 def test_one_that_stands_right_before_another_makes_room_beside_where_there_is_one_layer() -> None:
     """It can't be off the way before the other one would be there, if that did not brake."""
     flyers = [
