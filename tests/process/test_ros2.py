@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -17,8 +18,7 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process import ros2_reader
 from tests.process.by_hand import ByHand
 from tests.process.kept_open import KEEPER, kept_open
-from tests.process.programs import run_swarm
-from tests.process.router_processes import router
+from tests.process.router_processes import commanded, finish, router
 
 pytestmark = [pytest.mark.process]
 
@@ -123,36 +123,12 @@ def test_another_implementation_reads_a_flown_mission_and_has_a_task_done(tmp_pa
     assert seen["tasks"] == done
 
 
-def test_it_waits_for_mission_and_routers_and_ends_at_once(tmp_path: Path) -> None:
-    with contextlib.ExitStack() as stack:
-        _, endpoint = stack.enter_context(router("--listen", "tcp/127.0.0.1:0"))
-        by_hand = ByHand(tmp_path, stack, MISSION)
-        words = ["ros2", "--connect", by_hand.endpoint, "--ros-router", endpoint]
-        mirror = by_hand.start("ros2", words)
-        by_hand.wait_for("ros2", "in the graph")
-        mirror.terminate()
-        assert mirror.wait(20) == 143
-
-
-WRONG = {
-    ("--ros-router", "tcp/192.168.1.2:7447"): (
-        "--ros-router: tcp/192.168.1.2:7447 is another machine's or encrypted; "
-        "say how in a Zenoh configuration file, and give that as --ros-config"
-    ),
-    ("--ros-router", "nowhere"): (
-        "--ros-router: not an endpoint: 'nowhere'; "
-        "write PROTOCOL/HOST:PORT with tcp, tls, quic or ws, as in tcp/127.0.0.1:7447"
-    ),
-    ("--node", "2fast"): (
-        "--node: '2fast' cannot name a node of ROS 2; "
-        "use letters, digits and single underscores, beginning with no digit"
-    ),
-    ("--ros-config", "missing.json5"): "--ros-config: no such file: missing.json5; give one",
-}
-
-
-@pytest.mark.parametrize(("words", "fault"), WRONG.items())
-def test_what_is_wrong_is_told_in_one_line(words: tuple[str, ...], fault: str) -> None:
-    told = run_swarm("ros2", *words)
-
-    assert (told.returncode, told.stdout, told.stderr) == (2, "", f"{fault}\n")
+def test_one_router_may_serve_both_and_it_waits_for_a_mission_and_ends_at_once() -> None:
+    with router("--listen", "tcp/127.0.0.1:0") as (_, endpoint):
+        words = ("ros2", "--connect", endpoint, "--ros-router", endpoint)
+        with commanded(*words, SWARM_LOG_FORMAT="lines") as mirror:
+            assert mirror.stderr is not None
+            assert "in the graph" in mirror.stderr.readline()
+            mirror.send_signal(signal.SIGINT)
+            status, said, _ = finish(mirror)
+    assert (status, said) == (130, "")
