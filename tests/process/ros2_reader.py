@@ -145,7 +145,6 @@ def main(port: int, definitions: Path, withdrawn: list[str]) -> dict[str, Any]:
         return told is not None and told.phase == "running" and tasks in reader.newest
 
     wait_until(running, LIMIT_S, "a running mission")
-    types = reader.topics()
     added = reader.call(
         "/peckorder/add_task",
         "peckorder_msgs/srv/AddTask",
@@ -163,6 +162,7 @@ def main(port: int, definitions: Path, withdrawn: list[str]) -> dict[str, Any]:
     )
 
     def stands(task: str) -> str:
+        reader.follow()
         board = {each.id: each.state for each in reader.newest[tasks].tasks}
         return str(board.get(task))
 
@@ -175,7 +175,8 @@ def main(port: int, definitions: Path, withdrawn: list[str]) -> dict[str, Any]:
         for task in withdrawn
     ]
     wait_until(lambda: reader.newest[status].phase == "ended", LIMIT_S, "the end of the mission")
-    reader.follow()
+    types = reader.topics()
+    wait_until(lambda: reader.counts.keys() >= types.keys(), LIMIT_S, "a message of every topic")
     board = {each.id: each.state for each in reader.newest[tasks].tasks}
     uav = reader.newest["/peckorder/uav/uav1/odometry"]
     return {
