@@ -48,6 +48,8 @@ def test_a_viewer_may_look_on_and_an_operator_alone_takes_orders(
             seat = ["--keys", str(folder), "--connect", "tls/127.0.0.1:7447"]
             return main(["ros2", *seat, *words, "--check"])
 
+        assert status(viewer) == 0
+        assert status(operator, "--services") == 0
         assert capsys.readouterr().err == ""
         assert status(viewer, "--services") == 2
         told = capsys.readouterr().err
