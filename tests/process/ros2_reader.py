@@ -47,7 +47,6 @@ class RosReader:
         self._lock = threading.Lock()
         self._session = ZenohSession.get_instance(HOST, port)
         self._subscribers: dict[str, object] = {}
-        self._decoders = DecoderFactory()
         get_registry().messages_dir = definitions
 
     def topics(self) -> dict[str, list[str]]:
@@ -92,7 +91,7 @@ class RosReader:
             package, _, short = name.split("/")
             texts.append(f"{'=' * 80}\nMSG: {package}/{short}\n{text}")
         schema = Schema(id=1, name=typ, encoding="ros2msg", data="\n".join(texts).encode())
-        decoder = self._decoders.decoder_for("cdr", schema)
+        decoder = DecoderFactory().decoder_for("cdr", schema)  # it keeps one for each id
         assert decoder is not None
         return decoder
 
@@ -141,6 +140,7 @@ def main(port: int, definitions: Path, withdrawn: list[str]) -> dict[str, Any]:
 
     def running() -> bool:
         reader.follow()
+        assert reader.faults == []
         told = reader.newest.get(status)
         return told is not None and told.phase == "running" and tasks in reader.newest
 

@@ -50,7 +50,7 @@ def test_a_viewer_may_look_on_and_an_operator_alone_takes_orders(
 
         assert status(viewer) == 0
         assert status(operator, "--services") == 0
-        assert capsys.readouterr().err == ""
+        assert capsys.readouterr().err == 2 * "swarm: these options are right\n"
         assert status(viewer, "--services") == 2
         told = capsys.readouterr().err
     assert told.count("\n") == 1
