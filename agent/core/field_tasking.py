@@ -85,11 +85,6 @@ class FieldTasking(Tasking):
         """Whether other zones are in force than when this was last asked."""
         return self._flights.zones_changed()
 
-    @property
-    def stands_at(self) -> str | None:
-        """The base on whose ground the vehicle is."""
-        return self._visits.stands_at
-
     def way_home(self) -> HomeFlight | None:
         """From where the UAV is to the nearest base or its own start; None in a plain mission."""
         name = self._visits.stands_at
@@ -473,7 +468,7 @@ class FieldTasking(Tasking):
 
     def _leaves_at_s(self, now_s: float) -> float | None:
         """When it has to head home from where it is, on the own clock; None: never."""
-        stands = self.stands_at is not None
+        stands = self._visits.stands_at is not None
         seeks = self._machine.state in WITHOUT_AIM and not stands
         return self._limits.leaves_at_s(self._havens.home(now_s) if seeks else None, stands, now_s)
 

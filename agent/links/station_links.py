@@ -9,7 +9,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Hashable, Iterable, Sequence
 
-from agent.core.station_words import StationAction, StationAsked
+from agent.core.station_words import ShowStations, StationAction, StationAsked
 from agent.links.link import ByteLink, open_link
 from agent.vehicle.config import UdpOutAddress
 from agent.vehicle.signing import Signing, SigningKey
@@ -18,6 +18,9 @@ from swarm.runtime.clock import Clock, unix_s
 
 _FIRST_LINK_ID = 201
 """Of signed frames to the first ground station; the vehicle's own link has 200."""
+
+_FIRST_WORD_S = 0.5
+"""Wall time from the start to the first heartbeat: sockets are open by then."""
 
 
 class StationLinks:
@@ -55,6 +58,9 @@ class StationLinks:
         self._clock = clock
         self._on_asked = on_asked
         self._timer: asyncio.TimerHandle | None = None
+        self._opening = True
+        self._unsaid: ShowStations | None = None
+        """What was to be shown before any socket was open."""
 
     def __bool__(self) -> bool:
         return bool(self._links)
@@ -74,7 +80,7 @@ class StationLinks:
         for link in self._links:
             link.start()
         if self._links:
-            self._ring()
+            self._timer = asyncio.get_running_loop().call_later(_FIRST_WORD_S, self._ring)
 
     def show(self, frames: Iterable[bytes]) -> None:
         """Send every frame of the vehicle to everybody."""
@@ -84,7 +90,9 @@ class StationLinks:
 
     def tell(self, action: StationAction) -> None:
         """Pass on what the agent wants them to know."""
-        if self._links:
+        if self._opening and isinstance(action, ShowStations):
+            self._unsaid = action
+        elif self._links:
             self._carry_out(self._desk.tell(action, self._clock.now_s()))
 
     async def close(self) -> None:
@@ -109,6 +117,10 @@ class StationLinks:
 
     def _ring(self) -> None:
         now_s = self._clock.now_s()
+        self._opening = False
+        if self._unsaid is not None:
+            self._carry_out(self._desk.tell(self._unsaid, now_s))
+            self._unsaid = None
         self._carry_out(self._desk.advance(now_s))
         wait_s = self._clock.wall_delay_s(self._desk.next_deadline_s() - now_s)
         self._timer = asyncio.get_running_loop().call_later(max(0.0, wait_s), self._ring)
