@@ -9,9 +9,12 @@ from dataclasses import dataclass
 from itertools import takewhile
 
 
+_encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
+
+
 def as_text(row: Mapping[str, object]) -> str:
     """``row`` as JSON without a needless sign."""
-    return json.dumps(row, separators=(",", ":"), allow_nan=False)
+    return _encode(row)
 
 
 @dataclass(slots=True)
@@ -82,7 +85,7 @@ class RowTable:
 
 
 def _field(name: str, value: object) -> str:
-    return as_text({name: value})[1:-1]
+    return f'"{name}":{_encode(value)}'
 
 
 class AppendOnlyTable:
