@@ -8,7 +8,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import takewhile
 
-
 _encode = json.JSONEncoder(separators=(",", ":"), allow_nan=False).encode
 
 

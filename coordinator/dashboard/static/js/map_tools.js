@@ -152,7 +152,7 @@ export class MapTools {
     const text =
       layer === null
         ? `Layers: all ${layers.length}`
-        : `Layer: ${number(layers[layer], 0)} m, ${countByLayer(this.picture.uavs.values(), layers)[layer]}`;
+        : `Layer: ${number(layers[layer], 0)} m · ${countByLayer(this.picture.uavs.values(), layers)[layer]}`;
     setText(this.layer, text);
   }
 

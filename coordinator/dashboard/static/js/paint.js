@@ -370,7 +370,9 @@ export function paintUavs(canvas, view, picture, motion, look, spots) {
   canvas.font = `600 11px ${look.ink.font}`;
   canvas.textAlign = "left";
   const layers = picture.mission?.layers_m ?? [];
-  const inLayer = (row) => look.layer === null || layerOf(row, layers) === look.layer;
+  const meeting = new Set((picture.head?.conflicts ?? []).flatMap(({ uavs }) => uavs));
+  const inLayer = (row) =>
+    look.layer === null || layerOf(row, layers) === look.layer || meeting.has(row.id);
   for (const [id, { at }] of motion.shown) {
     const row = picture.uavs.get(id);
     const spot = view.spot(at);

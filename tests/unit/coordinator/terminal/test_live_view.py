@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
+from dataclasses import replace
 
 import pytest
 from rich.cells import cell_len
@@ -12,8 +14,10 @@ from rich.console import Console
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.terminal.live_view import LiveView, live_picture
 from swarm.model import Task, TaskId, UavId
+from swarm.model.ids import COORDINATOR
 from swarm.protocol.messages import MissionPhase
 from swarm.protocol.uav_messages import AttemptResult, Status, StatusPhase
+from tests.support.builders import brief_of
 from tests.support.observed_mission import Teller, random_mission, shipped, watch
 
 SIZES = ((80, 24), (100, 30), (104, 24), (200, 60))
@@ -296,3 +300,36 @@ def test_without_a_terminal_each_line_of_the_story_is_printed_once() -> None:
     assert lines[1] == "   0.56 s  uav3 ended t4: done"
     assert lines[-1].endswith("mission ends: every task has ended")
     assert "\x1b" not in printed(console)
+
+
+def crowd(n_uav: int) -> Teller:
+    """So many UAVs in one sky, two of them at each other, one that is nearly empty."""
+    flown = replace(random_mission(n_uav, n_uav, 0), separation_m=10.0)
+    teller = Teller(flown)
+    teller.say(COORDINATOR, replace(brief_of(flown), separation_m=10.0))
+    teller.begin()
+    for number, each in enumerate(flown.uavs):
+        place = (300.0 * number, 0.0, 30.0)
+        velocity = (0.0, 0.0, 0.0)
+        battery_frac = 0.05 if each.id == "uav150" else 0.9
+        if each.id in ("uav190", "uav191"):
+            way = 1.0 if each.id == "uav191" else -1.0
+            place, velocity = (50.0 - 25.0 * way, 500.0, 42.0), (5.0 * way, 0.0, 0.0)
+        told = Status(StatusPhase.FLYING, None, place, velocity, battery_frac, 1.0, {}, "")
+        teller.say(each.id, told, 1.0)
+    return teller
+
+
+@pytest.mark.parametrize("ascii_only", [False, True])
+def test_of_a_large_fleet_those_come_first_that_are_to_be_looked_at(*, ascii_only: bool) -> None:
+    text = shown(crowd(200).mission_state, 1.5, (100, 30), ascii_only=ascii_only)
+
+    rows = [line.rsplit(" flying ", 1)[0] for line in text.split("\n") if " idle " in line]
+    first, second, third = (row[-60:] for row in rows[:3])
+    assert "uav190" in first
+    assert "uav191" in second
+    assert "uav150" in third
+    assert re.search(r"and 18\d more", text)
+    assert "42 m" in text
+    assert "meet   uav190 and uav191" in text
+    assert ("X" if ascii_only else "╳") in text
