@@ -158,13 +158,13 @@ def map_panel(scene: Scene, width: int, height: int, signs: Signs) -> list[Text]
     tasks = [task for task in scene.tasks if task.state is not TaskState.WITHDRAWN]
     for task in sorted(tasks, key=_weight):
         canvas.put(view.spot(task.position_enu_m), *_task_look(task, signs))
+    # Names of UAVs come first, and the UAVs themselves over all but where two are about to meet.
+    for uav in scene.uavs:
+        canvas.put(view.spot(uav.place_enu_m), *_uav_look(uav, signs))
     for conflict in scene.conflicts:
         (east_m, north_m, up_m), (to_east_m, to_north_m, _) = conflict.places_enu_m
         middle = 0.5 * (east_m + to_east_m), 0.5 * (north_m + to_north_m), up_m
         canvas.put(view.spot(middle), signs.conflict, BAD)
-    # Names of UAVs come first, and the UAVs themselves over everything.
-    for uav in scene.uavs:
-        canvas.put(view.spot(uav.place_enu_m), *_uav_look(uav, signs))
     meeting = scene.about_to_meet
     for uav in sorted(scene.uavs, key=lambda uav: not (uav.troubled or uav.id in meeting)):
         style = _uav_look(uav, signs)[1]
