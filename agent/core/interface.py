@@ -327,6 +327,9 @@ class OrderVehicle:
     order: VehicleOrder
 
 
-Event = CommonEvent | MessagesReceived | VehicleReport | StationAsked
+VehicleNews = VehicleReport | StationAsked
+"""What comes over the link of a vehicle."""
+
+Event = CommonEvent | MessagesReceived | VehicleNews
 
 Action = CommonAction | OrderVehicle | StationAction

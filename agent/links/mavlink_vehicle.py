@@ -11,8 +11,8 @@ import asyncio
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Mapping, Sequence
 
-from agent.core.interface import HandedOver, VehicleOrder, VehicleReport
-from agent.core.station_words import StationAction, StationAsked
+from agent.core.interface import HandedOver, VehicleNews, VehicleOrder, VehicleReport
+from agent.core.station_words import StationAction
 from agent.links.link import ByteLink, open_link
 from agent.links.station_links import StationLinks
 from agent.links.vehicle_clock import VehicleClock
@@ -60,7 +60,7 @@ class MavlinkVehicle:
         config: BridgeConfig,
         url: str,
         clock: Clock,
-        on_report: Callable[[VehicleReport | StationAsked], None],
+        on_report: Callable[[VehicleNews], None],
         *,
         key: SigningKey | None = None,
         forward: Sequence[str] = (),

@@ -194,9 +194,10 @@ class ZenohRosGraph:
 
 
 def _ended(topic: _Topic) -> None:
-    for each in (topic.token, topic.publisher):
-        if each is not None:
-            each.undeclare()
+    if topic.token is not None:
+        topic.token.undeclare()
+    if topic.publisher is not None:
+        topic.publisher.undeclare()
 
 
 async def open_ros_graph(place: str | Path, domain_id: int, name: str) -> ZenohRosGraph:

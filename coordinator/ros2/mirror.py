@@ -29,7 +29,7 @@ from coordinator.mission_view.scene import Scene, scene_of
 from coordinator.mission_view.uav_state import Point, UavView
 from coordinator.ros2.message_types import PACKAGE, Fields
 from coordinator.ros2.wire import ros_names
-from swarm.model import Origin, Zone
+from swarm.model import Origin, TaskId, Zone
 from swarm.model.frames import wgs84_from_enu
 
 FRAME: Final = "map"
@@ -145,7 +145,7 @@ def _uav(uav: UavView) -> Fields:
 def _tasks(mission_state: MissionState, scene: Scene) -> Fields:
     board = mission_state.replica.board
     values = {task.id: task.value for task in scene.mission.tasks}
-    values |= {entry.task: entry.value for entry in board.values()}
+    values |= {TaskId(entry.task): entry.value for entry in board.values()}
     names = [uav.id for uav in scene.uavs]
     told = [
         {

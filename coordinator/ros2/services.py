@@ -15,6 +15,7 @@ from coordinator.operator.requests import OperatorRequest
 from coordinator.operator.task_edits import NewTask, TaskWithdrawal, Wgs84
 from coordinator.ros2.message_types import PACKAGE, Fields
 from swarm.model.ids import FLEET
+from swarm.protocol.fields import Point
 from swarm.protocol.messages import CommandKind
 
 Asked = Mapping[str, Any]
@@ -62,7 +63,7 @@ def _new_task(asked: Asked) -> OperatorRequest:
     points, geo_points = asked["points"], asked["geo_points"]
     if bool(points) == bool(geo_points):
         raise ValueError("give either points or geo_points")
-    places = [(point["x"], point["y"], point["z"]) for point in points] or [
+    places: list[Point | Wgs84] = [(point["x"], point["y"], point["z"]) for point in points] or [
         Wgs84(at["latitude"], at["longitude"], at["altitude"] if asked["use_altitude"] else None)
         for at in geo_points
     ]

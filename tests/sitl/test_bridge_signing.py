@@ -18,7 +18,7 @@ from agent.core.interface import (
     ReturnBegun,
     Telemetry,
     VehicleReady,
-    VehicleReport,
+    VehicleNews,
 )
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig
@@ -52,11 +52,11 @@ class Fleet:
     ) -> None:
         self.machine = machine
         self.server = server
-        self.reports: list[VehicleReport] = []
+        self.reports: list[VehicleNews] = []
         self.bridge = MavlinkVehicle(CONFIG, server.url, clock, self.reports.append, key=key)
 
     @property
-    def news(self) -> list[VehicleReport]:
+    def news(self) -> list[VehicleNews]:
         return [r for r in self.reports if not isinstance(r, Telemetry | NotReady)]
 
 
