@@ -22,8 +22,8 @@ from agent.core.interface import (
     Prepare,
     Return,
     Telemetry,
-    VehicleReady,
     VehicleNews,
+    VehicleReady,
 )
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.bridge import Bridge

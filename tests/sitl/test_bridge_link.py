@@ -25,8 +25,8 @@ from agent.core.interface import (
     Return,
     ReturnBegun,
     Telemetry,
-    VehicleReady,
     VehicleNews,
+    VehicleReady,
 )
 from agent.links.link import ByteLink, open_link
 from agent.links.mavlink_vehicle import MavlinkVehicle

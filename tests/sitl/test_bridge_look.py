@@ -27,8 +27,8 @@ from agent.core.interface import (
     Prepare,
     Refused,
     Return,
-    VehicleReady,
     VehicleNews,
+    VehicleReady,
 )
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig, CommandStyle

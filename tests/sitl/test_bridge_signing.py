@@ -17,8 +17,8 @@ from agent.core.interface import (
     Return,
     ReturnBegun,
     Telemetry,
-    VehicleReady,
     VehicleNews,
+    VehicleReady,
 )
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from agent.core.interface import GoTo, HandedOver, VehicleReady, VehicleNews
+from agent.core.interface import GoTo, HandedOver, VehicleNews, VehicleReady
 from agent.links.link import ByteLink, open_link
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig, TcpAddress, UdpOutAddress, parse_link

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from agent.core.interface import Arrived, GoTo, Refused, Telemetry, VehicleReady, VehicleNews
+from agent.core.interface import Arrived, GoTo, Refused, Telemetry, VehicleNews, VehicleReady
 from agent.links.link import ByteLink
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig
