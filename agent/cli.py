@@ -266,8 +266,9 @@ def agent(
             fence_radius_m=fence_radius_m,
             fence_height_m=fence_height_m,
         ).for_speedup(speedup)
+        asked = report if station_actions else None
         return MavlinkVehicle(
-            settings, mavlink, clock, report, key=key, forward=shown, heeds_stations=station_actions
+            settings, mavlink, clock, report, key=key, forward=shown, on_asked=asked
         )
 
     def core(memory: Memory | None) -> AgentCore:

@@ -11,7 +11,7 @@ import asyncio
 from collections import Counter, deque
 from collections.abc import Callable, Hashable, Mapping, Sequence
 
-from agent.core.interface import HandedOver, VehicleNews, VehicleOrder, VehicleReport
+from agent.core.interface import HandedOver, VehicleOrder, VehicleReport
 from agent.core.station_words import StationAction
 from agent.links.link import ByteLink, open_link
 from agent.links.station_links import StationLinks
@@ -45,11 +45,11 @@ class MavlinkVehicle:
         config: how to treat it.
         url: where the autopilot is; see `agent.links.link`.
         clock: vehicle time; a scaled one when the vehicle is simulated faster.
-        on_report: hears every report, in order, in the loop's thread, and what ground stations
-            ask of the UAV. It may give orders from inside the call.
+        on_report: hears every report, in order, in the loop's thread. It may give
+            orders from inside the call.
         key: shared with the autopilot: everything is signed, nothing unsigned believed.
         forward: URLs of ground stations that are shown the vehicle.
-        heeds_stations: whether these may ask anything of the UAV.
+        on_asked: hears what these ask of the UAV; None: they may not.
 
     Raises:
         InputError: a URL is wrong, or this machine cannot open such a link.
@@ -60,11 +60,11 @@ class MavlinkVehicle:
         config: BridgeConfig,
         url: str,
         clock: Clock,
-        on_report: Callable[[VehicleNews], None],
+        on_report: Callable[[VehicleReport], None],
         *,
         key: SigningKey | None = None,
         forward: Sequence[str] = (),
-        heeds_stations: bool = False,
+        on_asked: Callable[[StationAsked], None] | None = None,
     ) -> None:
         self.bridge = Bridge(config, None if key is None else Signing(key, unix_s))
         redial_s = clock.wall_delay_s(_REDIAL_TIMEOUTS * config.silence_timeout_s)
@@ -73,9 +73,8 @@ class MavlinkVehicle:
             map(parse_forward, forward),
             config.system_id,
             clock,
-            on_report,
+            on_asked,
             key=key,
-            heeds=heeds_stations,
         )
         self.bridge.codec.keep_frames = bool(self._stations)
         self._log = get_logger(__name__, link=self.link.url)

@@ -19,9 +19,6 @@ from swarm.runtime.clock import Clock, unix_s
 _FIRST_LINK_ID = 201
 """Of signed frames to the first ground station; the vehicle's own link has 200."""
 
-_FIRST_WORD_S = 0.5
-"""Wall time from the start to the first heartbeat: sockets are open by then."""
-
 
 class StationLinks:
     """The ground stations of one vehicle. Close them in ``finally``.
@@ -30,9 +27,8 @@ class StationLinks:
         addresses: where each listens.
         system_id: of the vehicle.
         clock: vehicle time.
-        on_asked: hears what a station asks of the UAV, in the loop's thread.
+        on_asked: hears what a station asks of the UAV, in the loop's thread; None: none may.
         key: all that is told is signed with it, and nothing unsigned heeded; None: nothing is.
-        heeds: whether anything is done for a station.
     """
 
     def __init__(
@@ -40,13 +36,12 @@ class StationLinks:
         addresses: Iterable[UdpOutAddress],
         system_id: int,
         clock: Clock,
-        on_asked: Callable[[StationAsked], None],
+        on_asked: Callable[[StationAsked], None] | None = None,
         *,
         key: SigningKey | None = None,
-        heeds: bool = False,
     ) -> None:
         self._links: list[ByteLink] = [
-            open_link(address, _Ear(number, self._heard))
+            open_link(address, _Ear(number, self._opened, self._heard))
             for number, address in enumerate(addresses)
         ]
         signings = [
@@ -54,11 +49,14 @@ class StationLinks:
             for number in range(len(self._links))
         ]
         interval_s = 1.0 / clock.wall_delay_s(1.0)
-        self._desk = StationDesk(system_id, signings, heeds=heeds, heartbeat_interval_s=interval_s)
+        self._desk = StationDesk(
+            system_id, signings, heeds=on_asked is not None, heartbeat_interval_s=interval_s
+        )
         self._clock = clock
         self._on_asked = on_asked
         self._timer: asyncio.TimerHandle | None = None
-        self._opening = True
+        self._up: set[int] = set()
+        """Places of the stations whose sockets are open: to others nothing is said."""
         self._unsaid: ShowStations | None = None
         """What was to be shown before any socket was open."""
 
@@ -79,8 +77,6 @@ class StationLinks:
         """Open the sockets, in the running loop."""
         for link in self._links:
             link.start()
-        if self._links:
-            self._timer = asyncio.get_running_loop().call_later(_FIRST_WORD_S, self._ring)
 
     def show(self, frames: Iterable[bytes]) -> None:
         """Send every frame of the vehicle to everybody."""
@@ -90,7 +86,7 @@ class StationLinks:
 
     def tell(self, action: StationAction) -> None:
         """Pass on what the agent wants them to know."""
-        if self._opening and isinstance(action, ShowStations):
+        if not self._up and isinstance(action, ShowStations):
             self._unsaid = action
         elif self._links:
             self._carry_out(self._desk.tell(action, self._clock.now_s()))
@@ -103,21 +99,25 @@ class StationLinks:
         for link in self._links:
             await link.close()
 
+    def _opened(self, station: int) -> None:
+        self._up.add(station)
+        if self._timer is None:
+            self._ring()
+
     def _heard(self, station: int, data: bytes) -> None:
         self._carry_out(self._desk.hear(station, data, self._clock.now_s()))
 
     def _carry_out(self, actions: Sequence[DeskAction]) -> None:
         for action in actions:
-            if isinstance(action, StationAsked):
+            if isinstance(action, TellStation):
+                for station in self._up:
+                    if action.station in (None, station):
+                        self._links[station].send(action.data)
+            elif self._on_asked is not None:
                 self._on_asked(action)
-            elif isinstance(action, TellStation):
-                to = self._links if action.station is None else [self._links[action.station]]
-                for link in to:
-                    link.send(action.data)
 
     def _ring(self) -> None:
         now_s = self._clock.now_s()
-        self._opening = False
         if self._unsaid is not None:
             self._carry_out(self._desk.tell(self._unsaid, now_s))
             self._unsaid = None
@@ -129,12 +129,15 @@ class StationLinks:
 class _Ear:
     """Listens to one ground station."""
 
-    def __init__(self, number: int, heard: Callable[[int, bytes], None]) -> None:
+    def __init__(
+        self, number: int, opened: Callable[[int], None], heard: Callable[[int, bytes], None]
+    ) -> None:
         self._number = number
+        self._opened = opened
         self._heard = heard
 
     def link_up(self) -> None:
-        pass
+        self._opened(self._number)
 
     def link_down(self) -> None:
         pass

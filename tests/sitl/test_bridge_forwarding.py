@@ -14,7 +14,6 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import VehicleReady, VehicleReport
-from agent.core.station_words import StationAsked
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.links.station_links import StationLinks
 from agent.vehicle.config import ONBOARD_COMPUTER, BridgeConfig, UdpOutAddress
@@ -83,7 +82,7 @@ class GroundStation(asyncio.DatagramProtocol):
 @asynccontextmanager
 async def flown(
     system_id: int, forward: list[str], clock: ScaledClock, key: SigningKey | None = None
-) -> AsyncIterator[tuple[MavlinkVehicle, list[VehicleReport | StationAsked]]]:
+) -> AsyncIterator[tuple[MavlinkVehicle, list[VehicleReport]]]:
     """A simulated vehicle and its bridge, under way to its start."""
     machine = SimulatedAutopilot(
         VehicleConfig(system_id, origin=ORIGIN), ArduCopterModel(), clock.now_s()
@@ -92,7 +91,7 @@ async def flown(
     secret = None if key is None else key.secret
     server = VehicleServer(machine, endpoint, clock, signing_secret=secret)
     await server.start()
-    reports: list[VehicleReport | StationAsked] = []
+    reports: list[VehicleReport] = []
     config = replace(CONFIG, system_id=system_id)
     vehicle = MavlinkVehicle(config, server.url, clock, reports.append, key=key, forward=forward)
     try:
@@ -158,7 +157,7 @@ def test_frames_are_shown_as_they_came_and_only_the_vehicles() -> None:
     asyncio.run(scenario())
 
 
-def _nobody(report: VehicleReport | StationAsked) -> None:
+def _nobody(report: VehicleReport) -> None:
     pass
 
 
@@ -185,7 +184,7 @@ def test_a_ground_station_that_is_not_there_costs_nothing_but_a_count() -> None:
     async def scenario() -> None:
         gone = UdpOutAddress("127.0.0.1", free_port(socket.SOCK_DGRAM))
         nowhere = UdpOutAddress("no-such-host.invalid", 14550)
-        forwarding = StationLinks([gone, nowhere], 1, ScaledClock(1.0), _nobody)
+        forwarding = StationLinks([gone, nowhere], 1, ScaledClock(1.0))
         assert forwarding
         forwarding.start()
         try:
@@ -204,7 +203,7 @@ def test_a_ground_station_that_starts_later_is_shown_the_vehicle() -> None:
     async def scenario() -> None:
         port = free_port(socket.SOCK_DGRAM)
         address = UdpOutAddress("127.0.0.1", port)
-        forwarding = StationLinks([address], 1, ScaledClock(1.0), _nobody)
+        forwarding = StationLinks([address], 1, ScaledClock(1.0))
         forwarding.start()
         loop = asyncio.get_running_loop()
         try:
