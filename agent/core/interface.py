@@ -327,9 +327,6 @@ class OrderVehicle:
     order: VehicleOrder
 
 
-VehicleNews = VehicleReport | StationAsked
-"""What comes over the link of a vehicle."""
-
-Event = CommonEvent | MessagesReceived | VehicleNews
+Event = CommonEvent | MessagesReceived | VehicleReport | StationAsked
 
 Action = CommonAction | OrderVehicle | StationAction

@@ -22,8 +22,8 @@ from agent.core.interface import (
     Prepare,
     Return,
     Telemetry,
-    VehicleNews,
     VehicleReady,
+    VehicleReport,
 )
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.bridge import Bridge
@@ -68,7 +68,7 @@ class JoinedFlight:
         self.bridge = Bridge(config)
         self.vehicle = SimulatedAutopilot(vehicle, flavour or ArduCopterModel(), self.now_s)
         self.codec = ChannelCodec(1, COMPONENT_ID, datagrams=False)
-        self.reports: list[tuple[float, VehicleNews]] = []
+        self.reports: list[tuple[float, VehicleReport]] = []
         self.track_enu_m: list[tuple[float, float, float]] = []
         """Where the vehicle was, whenever anything happened."""
         self.track_s: list[float] = []
@@ -119,7 +119,7 @@ class JoinedFlight:
         self.track_enu_m.append(self.vehicle.pilot.position_enu_m(self.now_s))
         self.track_s.append(self.now_s)
 
-    def run_until(self, report: VehicleNews | type, limit_s: float = 300.0) -> float:
+    def run_until(self, report: VehicleReport | type, limit_s: float = 300.0) -> float:
         """Vehicle time at which that report came."""
         end_s = self.now_s + limit_s
         while self.now_s < end_s:
@@ -322,7 +322,7 @@ async def _fly_through_sockets(
     times_s: list[float] = []
     targets = [(5.0, 12.0, 10.0), (17.0, 12.0, 10.0), (17.0, 0.0, 10.0)]
 
-    def on_report(report: VehicleNews) -> None:
+    def on_report(report: VehicleReport) -> None:
         match report:
             case VehicleReady() | Arrived():
                 times_s.append(clock.now_s())

@@ -25,8 +25,8 @@ from agent.core.interface import (
     Return,
     ReturnBegun,
     Telemetry,
-    VehicleNews,
     VehicleReady,
+    VehicleReport,
 )
 from agent.links.link import ByteLink, open_link
 from agent.links.mavlink_vehicle import MavlinkVehicle
@@ -239,7 +239,7 @@ async def test_listening_link_answers_whom_it_is_told_to() -> None:
 
 @in_loop
 async def test_a_stranger_at_the_port_keeps_no_vehicle_from_its_agent() -> None:
-    port, reports = free_port(socket.SOCK_DGRAM), list[VehicleNews]()
+    port, reports = free_port(socket.SOCK_DGRAM), list[VehicleReport]()
     config = BridgeConfig(1, ORIGIN, position_rate_hz=50.0)
     vehicle = MavlinkVehicle(config, f"udpin:127.0.0.1:{port}", ScaledClock(1.0), reports.append)
     await vehicle.start()
@@ -415,9 +415,9 @@ async def test_vehicle_is_flown_through_a_socket_from_preparation_to_landing() -
     clock = ScaledClock(speedup)
     served = ServedCopter(clock)
     port = await served.listen()
-    reports: list[VehicleNews] = []
+    reports: list[VehicleReport] = []
 
-    def on_report(report: VehicleNews) -> None:
+    def on_report(report: VehicleReport) -> None:
         """Orders given from inside a report are carried out in order."""
         reports.append(report)
         match report:

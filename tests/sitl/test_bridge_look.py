@@ -27,8 +27,8 @@ from agent.core.interface import (
     Prepare,
     Refused,
     Return,
-    VehicleNews,
     VehicleReady,
+    VehicleReport,
 )
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig, CommandStyle
@@ -133,7 +133,7 @@ class Watched:
 
     beside_deg: list[float] = field(default_factory=list)
     """While the ring is flown."""
-    reports: list[VehicleNews] = field(default_factory=list)
+    reports: list[VehicleReport] = field(default_factory=list)
     on_ring: bool = False
     _codec: Any = field(default_factory=lambda: mavlink.MAVLink(None))
 
@@ -157,11 +157,11 @@ async def flown(url: str, style: CommandStyle) -> Watched:
     watched = Watched()
     told = asyncio.Event()
 
-    def hear(report: VehicleNews) -> None:
+    def hear(report: VehicleReport) -> None:
         watched.reports.append(report)
         told.set()
 
-    async def until(*wanted: VehicleNews | type, limit_s: float) -> None:
+    async def until(*wanted: VehicleReport | type, limit_s: float) -> None:
         async with asyncio.timeout(limit_s):
             while not any(
                 r == w or (isinstance(w, type) and isinstance(r, w))

@@ -17,8 +17,8 @@ from agent.core.interface import (
     Return,
     ReturnBegun,
     Telemetry,
-    VehicleNews,
     VehicleReady,
+    VehicleReport,
 )
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig
@@ -52,11 +52,11 @@ class Fleet:
     ) -> None:
         self.machine = machine
         self.server = server
-        self.reports: list[VehicleNews] = []
+        self.reports: list[VehicleReport] = []
         self.bridge = MavlinkVehicle(CONFIG, server.url, clock, self.reports.append, key=key)
 
     @property
-    def news(self) -> list[VehicleNews]:
+    def news(self) -> list[VehicleReport]:
         return [r for r in self.reports if not isinstance(r, Telemetry | NotReady)]
 
 

@@ -14,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from agent.core.interface import GoTo, HandedOver, VehicleNews, VehicleReady
+from agent.core.interface import GoTo, HandedOver, VehicleReady, VehicleReport
 from agent.links.link import ByteLink, open_link
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig, TcpAddress, UdpOutAddress, parse_link
@@ -86,7 +86,7 @@ async def test_vehicle_behind_a_half_open_connection_is_handed_over_and_heard_ag
     clock = ScaledClock(speedup)
     served = ServedCopter(clock)
     port = await served.listen()
-    reports: list[VehicleNews] = []
+    reports: list[VehicleReport] = []
     config = BridgeConfig(1, ORIGIN, silence_timeout_s=10.0, position_rate_hz=20.0)
     vehicle = MavlinkVehicle(config, f"tcp:127.0.0.1:{port}", clock, reports.append)
     try:
@@ -209,7 +209,7 @@ async def test_silent_connection_is_given_up_with_the_vehicle() -> None:
     clock = ScaledClock(speedup)
     served = ServedCopter(clock)
     port = await served.listen()
-    reports: list[VehicleNews] = []
+    reports: list[VehicleReport] = []
     config = BridgeConfig(1, ORIGIN, silence_timeout_s=60.0, position_rate_hz=20.0)
     vehicle = MavlinkVehicle(config, f"tcp:127.0.0.1:{port}", clock, reports.append)
     try:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from agent.core.interface import Arrived, GoTo, Refused, Telemetry, VehicleNews, VehicleReady
+from agent.core.interface import Arrived, GoTo, Refused, Telemetry, VehicleReady, VehicleReport
 from agent.links.link import ByteLink
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.vehicle.config import BridgeConfig
@@ -43,7 +43,7 @@ class Wire(ByteLink):
 class Flight:
     """A vehicle behind a wire, in virtual time; is its own clock. Needs a running loop."""
 
-    def __init__(self, on_report: Callable[[Flight, VehicleNews], None]) -> None:
+    def __init__(self, on_report: Callable[[Flight, VehicleReport], None]) -> None:
         self.copter = FakeCopter(ORIGIN)
         self.copter.power_on(0.0)
         self.vehicle = MavlinkVehicle(CONFIG, "udpin:127.0.0.1:14550", self, self._hear)
@@ -73,12 +73,12 @@ class Flight:
                 self.vehicle.received(data)
         raise AssertionError(f"no {wanted} within 60 s, only {self._heard}")
 
-    def _hear(self, report: VehicleNews) -> None:
+    def _hear(self, report: VehicleReport) -> None:
         self._heard.add(type(report))
         self._on_report(self, report)
 
 
-def fly_to_north(on_report: Callable[[Flight, VehicleNews], None], until: type) -> None:
+def fly_to_north(on_report: Callable[[Flight, VehicleReport], None], until: type) -> None:
     """Prepare a vehicle and send it to the north."""
 
     async def fly() -> None:
@@ -95,7 +95,7 @@ def fly_to_north(on_report: Callable[[Flight, VehicleNews], None], until: type) 
 def test_an_order_from_inside_a_report_is_sent_before_it_returns() -> None:
     sent: list[int] = []
 
-    def on_report(flight: Flight, report: VehicleNews) -> None:
+    def on_report(flight: Flight, report: VehicleReport) -> None:
         if report == Arrived(1):
             before = flight.targets()
             flight.vehicle.order(GoTo(2, SOUTH))
@@ -109,7 +109,7 @@ def test_an_order_from_inside_a_report_is_sent_before_it_returns() -> None:
 def test_what_comes_of_an_order_is_reported_after_the_report_that_led_to_it() -> None:
     events: list[str] = []
 
-    def on_report(flight: Flight, report: VehicleNews) -> None:
+    def on_report(flight: Flight, report: VehicleReport) -> None:
         if isinstance(report, Telemetry):
             return
         events.append(f"hears {type(report).__name__}")
