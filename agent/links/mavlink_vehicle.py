@@ -12,7 +12,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Hashable, Mapping, Sequence
 
 from agent.core.interface import HandedOver, VehicleOrder, VehicleReport
-from agent.core.station_words import StationAction
+from agent.core.station_words import StationAction, StationAsked
 from agent.links.link import ByteLink, open_link
 from agent.links.station_links import StationLinks
 from agent.links.vehicle_clock import VehicleClock
