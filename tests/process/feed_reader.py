@@ -93,5 +93,6 @@ class FeedReader:
         for name, key in KEYS.items():
             rows = said.pop(name)
             before = {} if said["whole"] else self.rows[name]
-            self.rows[name] = before | {row[key]: row for row in rows}
+            # A row tells what tells it apart, and of the rest what has changed.
+            self.rows[name] = before | {row[key]: before.get(row[key], {}) | row for row in rows}
         self.head = said
