@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 from dataclasses import replace
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -36,6 +37,7 @@ from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
 from swarm.scenario.task_files import ImportOptions, TaskFile, read_task_file, read_task_files
 from tests.support.hills import above_m
+from tests.support.qgroundcontrol import faults
 
 PLAN = {"plan": EntryPoint("plan", "coordinator.cli:plan", "peckorder.commands")}
 IMPORT = {"import": EntryPoint("import", "swarm.scenario.cli:import_tasks", "peckorder.commands")}
@@ -69,16 +71,53 @@ def exported(what: Mission, folder: Path) -> list[Any]:
     made = write_plans(folder, what, planned(what), ExportFirmware.ARDUPILOT)
     documents = [json.loads(path.read_text(encoding="utf-8")) for path in made.files]
     for document in documents:
+        assert faults(document) == []
         items = document["mission"]["items"]
         assert [item["doJumpId"] for item in items] == [*range(1, len(items) + 1)]
         for item in items:
-            kinds = {key: type(item[key]) for key in ("frame", "command", "autoContinue")}
-            assert kinds == {"frame": int, "command": int, "autoContinue": bool}
-            assert (item["type"], len(item["params"])) == ("SimpleItem", 7)
             if item["frame"] == 3:
                 assert item["Altitude"] == item["params"][6]
-                assert {"AltitudeMode", "AMSLAltAboveTerrain"} <= item.keys()
     return documents
+
+
+@pytest.mark.parametrize(
+    ("spoil", "fault"),
+    [
+        (lambda plan: plan.pop("rallyPoints"), "plan.rallyPoints is missing"),
+        (lambda plan: plan.update(version=2), "plan.version is 2"),
+        (lambda plan: plan["mission"].update(version=1), "mission.version is 1"),
+        (lambda plan: plan["mission"].pop("firmwareType"), "mission.firmwareType is missing"),
+        (lambda plan: plan["mission"]["items"][2].pop("Altitude"), "items[2].Altitude is missing"),
+        (
+            lambda plan: plan["mission"]["items"][2].update(autoContinue=1),
+            "items[2].autoContinue is 1",
+        ),
+        (lambda plan: plan["mission"]["items"][0]["params"].pop(), "items[0].params is"),
+        (
+            lambda plan: plan["geoFence"]["polygons"][0]["polygon"][0].pop(),
+            "polygons[0] has",
+        ),
+        (
+            lambda plan: plan["geoFence"]["polygons"][0].pop("inclusion"),
+            "polygons[0].inclusion is missing",
+        ),
+    ],
+)
+def test_what_qgroundcontrol_would_refuse_is_seen(
+    tmp_path: Path, spoil: Callable[[Any], object], fault: str
+) -> None:
+    (document,) = exported(mission(LINE, zones=(WALL,)), tmp_path)
+    spoil(document)
+
+    assert any(each.startswith(fault) for each in faults(document))
+
+
+def test_what_qgroundcontrol_has_written_passes() -> None:
+    for name in ("orchard.plan", "quarry.plan"):
+        document = json.loads((DATA / name).read_text(encoding="utf-8"))
+        simple = [i for i in document["mission"]["items"] if i["type"] == "SimpleItem"]
+        document["mission"]["items"] = simple
+        assert faults(document) == [], name
 
 
 def commands(document: Any) -> list[int]:
