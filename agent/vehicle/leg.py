@@ -145,6 +145,17 @@ class _Leg(ABC):
             case ArrivalState.UNDERWAY:
                 pass
 
+    def _judge_stop(self, velocity_enu_m_s: Point) -> None:
+        """It may stand still elsewhere than at its corner, which it would not stay at."""
+        session = self._session
+        match self._arrival.judge(session.place_enu_m, velocity_enu_m_s, session.now_s):
+            case ArrivalState.STALLED:
+                self._on_stalled()
+            case ArrivalState.GIVEN_UP:
+                self._failure = self._arrival.complaint
+            case ArrivalState.ARRIVED | ArrivalState.UNDERWAY:
+                pass
+
 
 class RepositionLeg(_Leg):
     """A target told by one command, and told again if the vehicle stands still elsewhere.
@@ -305,17 +316,6 @@ class PathLeg(RepositionLeg):
         self._accepted = False
         self.start()
 
-    def _judge_stop(self, velocity_enu_m_s: Point) -> None:
-        """It may stand still elsewhere than at its corner, which it would not stay at."""
-        session = self._session
-        match self._arrival.judge(session.place_enu_m, velocity_enu_m_s, session.now_s):
-            case ArrivalState.STALLED:
-                self._on_stalled()
-            case ArrivalState.GIVEN_UP:
-                self._failure = self._arrival.complaint
-            case ArrivalState.ARRIVED | ArrivalState.UNDERWAY:
-                pass
-
 
 class _MissionLeg(_Leg):
     """A target that stands on the vehicle, or is on its way there; see `OnboardMission`.
@@ -348,6 +348,13 @@ class _MissionLeg(_Leg):
     def accepted(self) -> bool:
         """Whether the vehicle flies to it."""
         return self._mission.is_flown
+
+    def on_position(self, position: Position) -> None:
+        """Judge arrival, once the vehicle is past all corners: a line may end where it begins."""
+        if self._mission.is_past_corners:
+            super().on_position(position)
+        elif self.accepted:
+            self._judge_stop(position.velocity_enu_m_s)
 
     def start(self) -> None:
         """Put the target in force, in place of whatever stands on the vehicle."""

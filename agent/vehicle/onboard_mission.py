@@ -116,6 +116,8 @@ class OnboardMission:
         """The vehicle flies missions, and which one is not known: it should be stopped."""
         self.coming_home = False
         """The wait at the target ran out, and the mission's own return began."""
+        self._current: int | None = None
+        """Item that the vehicle says it flies, since the mission was begun."""
         self.takings = 0
         """How often the vehicle was seen to take up a mission."""
         self.is_ours: bool | None = None
@@ -127,6 +129,14 @@ class OnboardMission:
     def is_flown(self) -> bool:
         """Whether the newest target is what the vehicle is seen to fly to, or to wait at."""
         return self._stage is _Stage.FLOWN and self._wanted == self._standing
+
+    @property
+    def is_past_corners(self) -> bool:
+        """Whether it flies to the place itself; by its own word where corners lead there."""
+        standing = self._standing
+        if standing is None or not standing.corners:
+            return True
+        return self._current == standing.seqs(self._firmware).target
 
     @property
     def has_corners(self) -> bool:
@@ -258,6 +268,8 @@ class OnboardMission:
 
     def on_message(self, message: Inbound) -> None:
         """Take what concerns missions."""
+        if isinstance(message, MissionCurrent):
+            self._current = message.seq
         if self._start is not None:
             self._start.on_message(message)
         elif self._stage is _Stage.FLOWN and self._standing is not None:
@@ -366,6 +378,7 @@ class OnboardMission:
         if plan is not None:
             self._stage = _Stage.STARTING
             self._begun_s, self._near_since_s = self._conversation.now_s, None
+            self._current = None
             self._start = MissionStart(self._conversation, self._firmware, plan, again=again)
 
     def _give_up(self, reason: str, *, astray: bool) -> None:

@@ -9,10 +9,10 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import Arrived, GiveWay, GoTo, Hold, Home, Return
-from agent.vehicle.config import CommandStyle
+from agent.vehicle.config import BridgeConfig, CommandStyle
 from swarm.model.frames import enu_from_wgs84
 from tests.support.bridge_flight import ORIGIN, BridgeFlight
-from tests.support.fake_copter import REPOSITION
+from tests.support.fake_copter import REPOSITION, FakeCopter
 from tests.support.fake_px4 import FakePx4
 
 LOOK_AT = mavlink.MAV_CMD_DO_SET_ROI_LOCATION
@@ -182,3 +182,27 @@ def test_who_has_nothing_to_look_at_is_told_nothing(flight: BridgeFlight) -> Non
     flight.run_until(Home, limit_s=180.0)
 
     assert told(flight) == []
+
+
+def test_a_mission_along_a_line_that_ends_where_it_begins_is_flown_before_it_is_over(
+    fake: type[FakeCopter],
+) -> None:
+    # All of the line is near its end, and no speed too fast: only its corners tell.
+    near = BridgeConfig(
+        *(1, ORIGIN),
+        command=CommandStyle.MISSION,
+        acceptance_radius_m=60.0,
+        arrival_speed_m_s=50.0,
+        stall_timeout_s=1e6,
+    )
+    flight = BridgeFlight(fake(ORIGIN), near).prepared()
+    flight.order(GoTo(1, BEGIN))
+    flight.run_until(Arrived(1), limit_s=60.0)
+    flight.run(10.0)
+    seen = len(flight.telemetry)
+    flight.order(GoTo(2, BEGIN, via_enu_m=CORNERS))
+    flight.run_until(Arrived(2), limit_s=180.0)
+
+    flown = [each.position_enu_m for each in flight.telemetry[seen:]]
+    for corner in CORNERS:
+        assert min(math.dist(corner, place) for place in flown) < 5.0
