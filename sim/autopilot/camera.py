@@ -19,7 +19,7 @@ _BELOW_M = 1.0
 """Nobody turns to what is as good as below."""
 
 
-class Camera:
+class VehicleCamera:
     """The camera of one vehicle."""
 
     def __init__(self, pilot: Pilot) -> None:

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable
 
 from sim.autopilot.battery import BatteryModel
-from sim.autopilot.camera import Camera
+from sim.autopilot.camera import VehicleCamera
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, Narrator, Outbox
 from sim.autopilot.failsafes import FailsafeMonitor
@@ -89,7 +89,7 @@ class Pilot:
         self.fence_store = fence_store
         self.fence = FenceMonitor(self, fence_store)
         self._ground_contact = GroundContact(self)
-        self.camera = Camera(self)
+        self.camera = VehicleCamera(self)
 
     # --- Time -------------------------------------------------------------------
 
