@@ -30,8 +30,10 @@ TARGET_TAG = "target"
 """Tag of the command that carries a target: a new one supersedes the last."""
 
 
-_TURN_RAD = math.radians(15.0)
+_TURN_RAD = math.radians(10.0)
 """So far the nose may be beside what it is to point at, where targets turn it."""
+_TURNS_LATE_S = 1.0
+"""PX4 turns as smoothly as it flies: a heading told so early is flown in time [s]."""
 
 
 class ArrivalState(Enum):
@@ -212,11 +214,20 @@ class RepositionLeg(_Leg):
         self._session.send(TARGET_TAG, message)
 
     def _bearing_rad(self) -> float | None:
-        """To what is looked at, clockwise from north; None where the nose is not turned there."""
-        if self._look_at_m is None or not math.isfinite(self._session.place_enu_m[0]):
+        """To what is looked at, clockwise from north, from where the vehicle soon is.
+
+        None where the nose is not turned there.
+        """
+        position, place_enu_m = self._session.vehicle.position, self._session.place_enu_m
+        if self._look_at_m is None or position is None or not math.isfinite(place_enu_m[0]):
             return None
-        (east_m, north_m), place_enu_m = self._look_at_m, self._session.place_enu_m
-        return math.atan2(east_m - place_enu_m[0], north_m - place_enu_m[1])
+        east_m, north_m = (
+            there - here - _TURNS_LATE_S * speed_m_s
+            for there, here, speed_m_s in zip(
+                self._look_at_m, place_enu_m[:2], position.velocity_enu_m_s[:2], strict=True
+            )
+        )
+        return math.atan2(east_m, north_m)
 
     def on_position(self, position: Position) -> None:
         """Judge arrival, and keep the nose on what is looked at."""

@@ -176,7 +176,7 @@ async def flown(url: str, style: CommandStyle) -> Watched:
         lambda: _Protocol(watched), local_addr=("127.0.0.1", 0)
     )
     port = ground.get_extra_info("sockname")[1]
-    config = BridgeConfig(1, ORIGIN, command=style, silence_timeout_s=30.0)
+    config = BridgeConfig(1, ORIGIN, command=style, silence_timeout_s=30.0, accept_no_failsafe=True)
     vehicle = MavlinkVehicle(config, url, ScaledClock(1.0), hear, forward=[f"udp:127.0.0.1:{port}"])
     try:
         await vehicle.start()

@@ -90,7 +90,10 @@ def test_the_nose_is_turned_by_targets_where_nothing_else_turns_it(
     while not any(isinstance(each, Arrived) and each.leg == 2 for each in flight.reports):
         before = len(flight.copter.commands(REPOSITION))
         flight.step()
-        east_m, north_m, _ = flight.telemetry[-1].position_enu_m
+        told = flight.telemetry[-1]  # a second later it is on from there
+        east_m, north_m = (
+            p + v for p, v in zip(told.position_enu_m[:2], told.velocity_enu_m_s[:2], strict=True)
+        )
         orders = flight.copter.commands(REPOSITION)
         if len(orders) > before:
             bearing_rad = math.atan2(MIDDLE[0] - east_m, MIDDLE[1] - north_m)
