@@ -123,6 +123,8 @@ _STUCK_S = 8.0
 _TRY_S = 4.0
 """A way that is barred for so long is left for another."""
 _LEFT_S = 12.0
+_STANDS_M = 1.0
+"""Who flies no farther within the horizon stands."""
 _NEAR_M = 2.0
 """A corner of a detour that near has been flown."""
 
@@ -326,9 +328,10 @@ class TacticalResolver:
     def _round(
         self, own: OwnFlight, stop_m: Place, others: Sequence[_Other], in_way: str | None
     ) -> Iterator[_Option]:
-        """Past the one in its way on a side, where it can't fly higher or lower."""
+        """Past one that stands in its way on a side, where it can't fly higher or lower."""
         for other in others:
-            if other.uav == in_way:
+            here_m, there_m = other.expected_m[0], other.expected_m[-1]
+            if other.uav == in_way and math.dist(here_m, there_m) < _STANDS_M:
                 sides = round_m(stop_m, other.expected_m[0], self._rules.aside_m)
                 for label, corners in zip(("right", "left"), sides, strict=False):
                     path_m = (*corners, *own.path_enu_m)
