@@ -242,7 +242,8 @@ class TacticalResolver:
         elif now is None or now_s - self._in_way_s >= _CLEAR_S:
             return keep, None
         if now is not None and self._left.get(now.label, -math.inf) <= now_s:
-            waits = now.maneuver is Maneuver.HOLD and self._has_stood(now_s) and own.path_enu_m
+            idles = now.maneuver in (Maneuver.HOLD, Maneuver.ASIDE)
+            waits = idles and self._has_stood(now_s) and own.path_enu_m
             if not waits and (
                 self._in_way(own, now, others) is None or self._gets_out(now, others)
             ):
@@ -351,14 +352,8 @@ class TacticalResolver:
         aside_m = self._rules.aside_m
         for label, side in (("right", 1.0), ("left", -1.0), ("far right", 2.0), ("far left", -2.0)):
             beside_m = side * aside_m
-            yield (
-                f"aside {label}",
-                (
-                    stop_m[0] + beside_m * north,
-                    stop_m[1] - beside_m * east,
-                    stop_m[2],
-                ),
-            )
+            place_m = stop_m[0] + beside_m * north, stop_m[1] - beside_m * east, stop_m[2]
+            yield f"aside {label}", place_m
 
     def _is_within(self, path_m: Sequence[Place]) -> bool:
         return all(self._rules.low_m <= up <= self._rules.high_m for _, _, up in path_m)
@@ -457,7 +452,10 @@ class TacticalResolver:
         path_m = option.path_enu_m if makes_room else ()
         whom = barred_by if braked else because_of
         self._advice = Advice(option.maneuver, path_m, slowed_m_s, whom, braked)
-        if self._advice.stands and own.path_enu_m:
+        aside = option.maneuver is Maneuver.ASIDE and (
+            math.dist(own.position_enu_m, option.path_enu_m[-1]) <= _NEAR_M
+        )
+        if (self._advice.stands or aside) and own.path_enu_m:
             self._stood_since_s = now_s if self._stood_since_s is None else self._stood_since_s
         else:
             self._stood_since_s = None
