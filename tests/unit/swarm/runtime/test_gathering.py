@@ -41,8 +41,12 @@ def large(n_uav: int) -> Message:
 
 async def brief_of(core: ScriptedCore, played: Played, ear: Ear, n_uav: int) -> None:
     """Let it hear of a fleet of that size; what is gathered from then on is heard together."""
-    said_by(played, large(n_uav))
-    there = lambda: large(n_uav) in ear.heard or MessageReceived(large(n_uav)) in core.heard  # noqa: E731
+    told = large(n_uav)
+
+    def there() -> bool:
+        return told in ear.heard or MessageReceived(told) in core.heard
+
+    said_by(played, told)
     await until(there, "hearing of the fleet")
 
 
