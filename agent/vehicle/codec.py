@@ -130,7 +130,7 @@ class MavlinkCodec:
 
     @property
     def unknown_frames(self) -> int:
-        """Frames received whose message the dialect does not have."""
+        """Frames received whose message is not known."""
         return self._framer.unknown_frames
 
     def decode(
@@ -155,6 +155,8 @@ class MavlinkCodec:
                 self._kept_frames.append(frame.data)
             raw = frame.message
             if raw is None:
+                if frame.later is not None:
+                    heard.append(DecodedMessage(frame.system_id, frame.data[6], frame.later))
                 continue
             if raw.get_msgId() == mavlink.MAVLINK_MSG_ID_STATUSTEXT:
                 heard += self._texts_of(raw)

@@ -20,6 +20,7 @@ from agent.vehicle.commands import CommandEnded, CommandOutcome, CommandQueue, V
 from agent.vehicle.config import BridgeConfig
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import CommandLong, DecodedMessage, Heartbeat, Inbound, Position
+from agent.vehicle.mode_names import ModeNameRequests
 
 _AUTOPILOT_COMPONENT = 1
 
@@ -109,10 +110,11 @@ class _Stream:
 
 
 class StreamRequests:
-    """Asks one vehicle for its streams."""
+    """Asks one vehicle for its streams, and once for the names of its modes."""
 
     def __init__(self, config: BridgeConfig, firmware: Firmware) -> None:
         self._config = config
+        self._names = ModeNameRequests()
         self._streams: dict[type[Inbound], _Stream] = {
             Position: _Stream(_MSG_ID_POSITION, 1.0 / config.position_rate_hz)
         }
@@ -121,12 +123,14 @@ class StreamRequests:
 
     def on_message(self, message: Inbound, now_s: float) -> None:
         """Note that a stream flows."""
+        self._names.on_message(message)
         stream = self._streams.get(type(message))
         if stream is not None:
             stream.ask_at_s = now_s + self._patience_s(stream)
 
     def on_ended(self, ended: CommandEnded, now_s: float) -> None:
         """Be patient with a stream that was refused: it may not exist."""
+        self._names.on_ended(ended)
         if ended.ending is not CommandOutcome.REFUSED:
             return
         for stream in self._streams.values():
@@ -136,12 +140,13 @@ class StreamRequests:
 
     def ask_anew(self) -> None:
         """Ask for everything again, because link or autopilot began anew."""
+        self._names.ask_anew()
         for stream in self._streams.values():
             stream.ask_at_s = -math.inf
 
     def advance(self, commands: CommandQueue, now_s: float) -> list[VehicleCommand]:
         """Requests that are due."""
-        out: list[VehicleCommand] = []
+        out = self._names.advance(commands, now_s)
         for stream in self._streams.values():
             if now_s < stream.ask_at_s or commands.pending(_tag(stream)):
                 continue

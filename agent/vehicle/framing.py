@@ -15,6 +15,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from agent.vehicle.later_messages import LaterMessage, later_message
 from agent.vehicle.messages import StatusText
 from agent.vehicle.signing import SIGNATURE_BYTES, SIGNED, SignatureVerdict, Signing
 
@@ -39,6 +40,8 @@ class MavlinkFrame:
     system_id: int
     message: Any
     """Of the dialect; None if it does not have that message."""
+    later: LaterMessage | None = None
+    """What it says if it is one of the messages that are younger than the dialect."""
 
     @property
     def signed(self) -> bool:
@@ -66,7 +69,7 @@ class Framer:
         self.bad_bytes = 0
         """Bytes that belonged to no valid frame."""
         self.unknown_frames = 0
-        """Frames of messages that the dialect does not have."""
+        """Frames of messages that nobody here knows."""
         self.unchecked_frames = 0
         """Signed frames taken without a key to check them with."""
 
@@ -146,8 +149,9 @@ class Framer:
     def _frame(self, data: bytes, message: Any) -> MavlinkFrame:
         system_id = data[5] if data[0] == _START_V2 else data[3]
         if message.get_msgId() < 0:
-            self.unknown_frames += 1
-            return MavlinkFrame(data, system_id, None)
+            later = later_message(data)
+            self.unknown_frames += later is None
+            return MavlinkFrame(data, system_id, None, later)
         return MavlinkFrame(data, system_id, message)
 
     def _decode(self, start: int, size: int) -> Any | None:

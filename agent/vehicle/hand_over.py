@@ -199,7 +199,8 @@ class LinkLoss:
         if self._tells_whether_it_flies and not firmware.airborne(session.vehicle):
             return "it stands on the ground"
         if heartbeat.armed and firmware.is_returning(mode):
-            return f"it returns or lands by itself, in {firmware.mode_name(mode)}"
+            name = firmware.mode_name(mode, session.vehicle.told_modes)
+            return f"it returns or lands by itself, in {name}"
         if heartbeat.armed and firmware.is_mission(mode) and mode == self._mode:
             return "it flies its mission, which ends at home"
         # A takeoff ends in the guided mode by itself.

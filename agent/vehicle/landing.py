@@ -149,7 +149,9 @@ class Landing(Activity):
         if firmware.is_landing(mode):
             self._begun = self._seen = True
         elif not (session.flies_for_us(mode) or self.obeys(mode)):
-            self.taken = f"its pilot flies it in {firmware.mode_name(mode)}"
+            self.taken = (
+                f"its pilot flies it in {firmware.mode_name(mode, session.vehicle.told_modes)}"
+            )
             return False
         self._ours = True
         return True

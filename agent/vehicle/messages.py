@@ -135,6 +135,36 @@ class StatusText:
 
 
 @dataclass(frozen=True, slots=True)
+class AvailableMode:
+    """AVAILABLE_MODES: one mode by the name that the vehicle has for it."""
+
+    custom_mode: int
+    name: str
+    """Empty for those of MAVLink's standard modes that PX4 does not name."""
+    index: int
+    """Its number among the vehicle's modes, from 1."""
+    modes: int
+    """How many there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class AvailableModesChange:
+    """AVAILABLE_MODES_MONITOR."""
+
+    sequence: int
+    """Another one than before: so are the modes."""
+
+
+@dataclass(frozen=True, slots=True)
+class CurrentMode:
+    """CURRENT_MODE."""
+
+    custom_mode: int
+    intended_mode: int
+    """Which was asked for; another one if a failsafe chose, 0 if that is not told."""
+
+
+@dataclass(frozen=True, slots=True)
 class ParameterValue:
     """PARAM_VALUE."""
 
@@ -217,6 +247,9 @@ Inbound = (
     | ExtendedState
     | CommandAck
     | StatusText
+    | AvailableMode
+    | AvailableModesChange
+    | CurrentMode
     | ParameterValue
     | ParameterMissing
     | MissionRequest

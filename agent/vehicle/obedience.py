@@ -418,7 +418,9 @@ def return_home(activity: Activity, order: Return, session: VehicleSession) -> A
     if session.silent:
         return refuse_return(order, "the autopilot is silent", session)
     if not (commanded or firmware.is_returning(mode)):
-        return hand_over(session, f"its pilot flies it in {firmware.mode_name(mode)}")
+        return hand_over(
+            session, f"its pilot flies it in {firmware.mode_name(mode, session.vehicle.told_modes)}"
+        )
     return come_home(order, firmware, session)
 
 

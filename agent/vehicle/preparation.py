@@ -207,7 +207,7 @@ class _Preparation:
                 mission.look()
         elif heartbeat.armed:
             self._flown_by_pilot = True
-            mode = firmware.mode_name(heartbeat.custom_mode)
+            mode = firmware.mode_name(heartbeat.custom_mode, self._session.vehicle.told_modes)
             self.waiting_for = (
                 f"armed in {mode} by its pilot: land it, "
                 f"or switch it to {firmware.commanded_mode_name}"

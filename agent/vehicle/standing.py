@@ -101,7 +101,8 @@ class Standing(Activity):
             # Whoever armed it may stand beside it.
             self._take_back(_ARMED if self.may_start else self._refusal)
             if firmware is not None and firmware.airborne(session.vehicle):
-                self.taken = f"its pilot flies it in {firmware.mode_name(heartbeat.custom_mode)}"
+                mode = firmware.mode_name(heartbeat.custom_mode, self._session.vehicle.told_modes)
+                self.taken = f"its pilot flies it in {mode}"
         if self.is_ready and (heartbeat is None or not heartbeat.armed):
             return
         reason = self._waits_for()

@@ -14,7 +14,9 @@ from enum import Enum, auto
 
 from agent.vehicle.charge import ChargeMeter
 from agent.vehicle.messages import (
+    AvailableMode,
     BatteryStatus,
+    CurrentMode,
     EkfStatus,
     ExtendedState,
     Heartbeat,
@@ -45,6 +47,9 @@ _WARNING, _NOTICE = 4, 5
 _WARNINGS = 8
 
 _RECENT_S = 5.0
+
+_MOST_MODES = 64
+"""Of which a vehicle may tell names; both firmwares have about thirty."""
 
 _FAILSAFE_WORDS = ("failsafe", "breach")
 
@@ -86,6 +91,9 @@ class VehicleState:
     ekf_flags: int | None = None
     landed: LandedState = LandedState.UNDEFINED
     charge: ChargeMeter = field(default_factory=ChargeMeter)
+    told_modes: dict[int, str] = field(default_factory=dict)
+    """Its own names of its modes, as far as it has any."""
+    current_mode: CurrentMode | None = None
     _warnings: deque[tuple[float, str]] = field(default_factory=lambda: deque(maxlen=_WARNINGS))
     """The autopilot's last warnings, and when each came."""
     _newest_boot_s: float | None = None
@@ -146,6 +154,12 @@ class VehicleState:
                 self.ekf_flags = flags
             case ExtendedState(landed):
                 self.landed = landed
+            case AvailableMode(mode, name) if name and (
+                mode in self.told_modes or len(self.told_modes) < _MOST_MODES
+            ):
+                self.told_modes[mode] = name
+            case CurrentMode():
+                self.current_mode = message
             case StatusText(severity, text) if _is_reason(severity, text):
                 self._warnings.append((now_s, text))
             case _:
@@ -187,6 +201,11 @@ class VehicleState:
     def failsafe_told(self, now_s: float) -> bool:
         """Whether it has said lately that a failsafe acts."""
         return any(_is_failsafe(text) for text in self._recent(now_s, _RECENT_S))
+
+    def failsafe_chose(self, custom_mode: int) -> bool:
+        """Whether by its own word it is in that mode although another one was asked for."""
+        told = self.current_mode
+        return told is not None and told.custom_mode == custom_mode != told.intended_mode != 0
 
     def _recent(self, now_s: float, window_s: float) -> list[str]:
         """What it warned of lately, newest first."""

@@ -50,13 +50,13 @@ def intervention(
         return None
     mode = heartbeat.custom_mode
     alarmed = heartbeat.system_status in (_STATE_CRITICAL, _STATE_EMERGENCY)
-    if alarmed or vehicle.failsafe_told(now_s):
+    if alarmed or vehicle.failsafe_told(now_s) or vehicle.failsafe_chose(mode):
         who = "a failsafe"
     elif firmware.is_returning(mode):
         who = "its pilot or a failsafe"
     else:
         who = "its pilot"
-    return f"{who} switched it to {firmware.mode_name(mode)}{said}"
+    return f"{who} switched it to {firmware.mode_name(mode, vehicle.told_modes)}{said}"
 
 
 class PilotConsent:

@@ -159,7 +159,11 @@ def _hold_found(search: Searching, order: Hold, session: VehicleSession) -> Acti
     mode = heartbeat.custom_mode
     if session.flies_for_us(mode) or firmware.is_taking_off(mode):
         return begin_holding(search, order, session)
-    session.report(Refused(order, f"its pilot flies it in {firmware.mode_name(mode)}"))
+    session.report(
+        Refused(
+            order, f"its pilot flies it in {firmware.mode_name(mode, session.vehicle.told_modes)}"
+        )
+    )
     return Idle(session)
 
 

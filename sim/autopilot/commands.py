@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from sim.autopilot.available_modes import AVAILABLE_MODES_ID, available_modes
 from sim.autopilot.events import FirmwareEvent, Sender
 from sim.autopilot.flight import FlightMode
 from sim.autopilot.message_rates import MessageRates
@@ -141,8 +142,7 @@ class CommandExecutor:
             case mavlink.MAV_CMD_GET_MESSAGE_INTERVAL:
                 return self._get_message_interval(command, sender)
             case mavlink.MAV_CMD_REQUEST_MESSAGE:
-                asked = command.params[0]
-                return self._send(int(asked), sender, now_s) if math.isfinite(asked) else _DENIED
+                return self._send_asked(command, sender, now_s)
             case mavlink.MAV_CMD_REQUEST_AUTOPILOT_CAPABILITIES:
                 return self._send(mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION, sender, now_s)
             case mavlink.MAV_CMD_DO_FENCE_ENABLE if pilot.flavour.fence_behaviour.switchable:
@@ -300,6 +300,14 @@ class CommandExecutor:
             return self._pilot.flavour.refusals.no_such_message
         self._outbox.reply(sender, message)
         return _ACCEPTED
+
+    def _send_asked(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
+        message_id, which = command.params[:2]
+        if message_id == AVAILABLE_MODES_ID:
+            for message in available_modes(self._pilot.flavour, which):
+                self._outbox.reply(sender, message)
+            return _ACCEPTED
+        return self._send(int(message_id), sender, now_s) if math.isfinite(message_id) else _DENIED
 
     def _set_message_interval(self, command: AutopilotCommand, sender: Sender, now_s: float) -> int:
         message_id, interval_us = command.params[:2]

@@ -13,8 +13,6 @@ from collections import Counter
 from dataclasses import dataclass, replace
 from random import Random
 
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
-
 from agent.core.interface import (
     GiveWay,
     GoTo,
@@ -39,6 +37,7 @@ from tests.support.fake_copter import (
     FakeCopter,
 )
 from tests.support.hostile_input import FLAVOURS, Hostile, is_frame
+from tests.support.mavlink_frames import MESSAGES
 
 KEY = SigningKey(bytes(range(1, 33)))
 START = Prepare((5.0, 0.0, 10.0), 4.0)
@@ -235,7 +234,7 @@ class Episode:
         if self._forger is None or self.random.random() < 0.3 or not is_frame(piece):
             return piece
         message_id = int.from_bytes(piece[7:10], "little")
-        return self._forger.sign(piece, mavlink.mavlink_map[message_id].crc_extra)
+        return self._forger.sign(piece, MESSAGES[message_id].crc_extra)
 
     def _order(self) -> VehicleOrder:
         random = self.random

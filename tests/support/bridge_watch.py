@@ -63,12 +63,14 @@ from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.conversation import BridgeAction, SendBytes
 from agent.vehicle.firmware.ardupilot import ArduCopter
 from agent.vehicle.firmware.px4 import Px4Copter
+from agent.vehicle.later_messages import AVAILABLE_MODES_ID
 from agent.vehicle.session import BridgeEvent, TimePassed
 from agent.vehicle.transitions import SUCCESSORS
 from swarm.model.frames import enu_from_wgs84
 from tests.support.bridge_memory import see_buffer, see_memory
 from tests.support.broken_rule import BrokenError, hold
 from tests.support.fake_copter import (
+    ASK,
     INTERVAL,
     FakeCopter,
 )
@@ -260,6 +262,9 @@ class BridgeWatch:
             return
         if name == "COMMAND_LONG" and message.command == INTERVAL:
             hold(message.param2 > 0.0, f"message interval {message.param2}")
+            return
+        if name == "COMMAND_LONG" and message.command == ASK:
+            hold(message.param1 == AVAILABLE_MODES_ID, f"asks for message {message.param1}")
             return
         if name in ("PARAM_REQUEST_READ", "PARAM_SET") and message.param_id in self.fake.jerk_names:
             self._see_jerk(message)

@@ -44,7 +44,7 @@ from swarm.protocol.messages import CommandKind
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import StatusPhase
 from tests.support.bridge_watch import BridgeWatch
-from tests.support.fake_copter import INTERVAL, FakeCopter
+from tests.support.fake_copter import ASK, INTERVAL, FakeCopter
 from tests.support.fake_px4 import FakePx4
 from tests.support.fleet_builders import plan_for
 
@@ -106,7 +106,7 @@ class Sent:
     @property
     def harmless(self) -> bool:
         """Whether it commands nothing: a heartbeat, a request for messages, the old jerk."""
-        asks = self.name == "COMMAND_LONG" and self.message.command == INTERVAL
+        asks = self.name == "COMMAND_LONG" and self.message.command in (ASK, INTERVAL)
         return asks or self.name == "HEARTBEAT" or self._puts_jerk_back
 
     @property

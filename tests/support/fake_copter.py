@@ -13,6 +13,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from pymavlink.dialects.v20 import development as later_dialect
 
 from swarm.model.frames import Origin, enu_from_wgs84, wgs84_from_enu
 from tests.support.fake_fences import FENCE, FakeFence
@@ -23,6 +24,7 @@ Point = tuple[float, float, float]
 STABILIZE, AUTO, GUIDED, LOITER, RTL, LAND = 0, 3, 4, 5, 6, 9
 ACCEPTED, BUSY, DENIED, UNSUPPORTED, FAILED = 0, 1, 2, 3, 4
 SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, INTERVAL = 176, 400, 22, 192, 178, 511
+ASK = 512
 SWITCH_FENCE = 207
 
 _CLIMB_M_S = 2.5
@@ -38,6 +40,7 @@ class FakeCopter:
     boot_mode, own_mode, pilot_mode = STABILIZE, GUIDED, LOITER
     """What it boots into, what takes targets, and what a pilot flies in."""
     return_mode, land_mode, mission_mode = RTL, LAND, AUTO
+    tells_all_modes = False
     missions: type[CopterMissions] = CopterMissions
     mode_names: ClassVar = {GUIDED: "GUIDED", LOITER: "LOITER", RTL: "RTL", LAND: "LAND"}
     takeoff_mode = GUIDED
@@ -82,6 +85,8 @@ class FakeCopter:
         ready_s: float = 3.0,
         default_speed_m_s: float = 10.0,
     ) -> None:
+        self.modes: dict[int, str] = {}
+        """Its modes by number, as it tells them; none: it knows no such message."""
         self.origin = origin
         self.system_id = system_id
         self.component_id = 1
@@ -175,6 +180,14 @@ class FakeCopter:
         self._sender.srcComponent = self.component_id
         self._buffer.append(bytes(message.pack(self._sender)))
         self._sender.seq = (self._sender.seq + 1) % 256
+
+    def _tell_modes(self, asked: int) -> None:
+        """The one asked for; of all, as many as this firmware tells."""
+        last = (len(self.modes) if self.tells_all_modes else 1) if asked == 0 else asked
+        named = list(enumerate(self.modes.items(), 1))
+        for index, (mode, name) in named[max(0, asked - 1) : last]:
+            fields = (len(named), index, 0, mode, 0, name.encode())
+            self.say(later_dialect.MAVLink_available_modes_message(*fields))
 
     def text(self, severity: int, text: str) -> None:
         self.say(mavlink.MAVLink_statustext_message(severity, text.encode()))
@@ -289,6 +302,8 @@ class FakeCopter:
                 self.speed_m_s = m.param2
             case 192:
                 return self._reposition(m)
+            case 512 if self.modes and m.param1 == 435.0:
+                self._tell_modes(int(m.param2))
             case 207:
                 return ACCEPTED if self.fence.switch(m) else FAILED
             case _:
@@ -423,5 +438,5 @@ class FakeCopter:
         return [] if self.silent else said
 
     def count(self) -> Counter[int]:
-        """How often each command number was heard."""
-        return Counter(m.command for m in self.heard if hasattr(m, "command"))
+        """How often each command number was heard, but for questions, which command nothing."""
+        return Counter(m.command for m in self.heard if getattr(m, "command", ASK) != ASK)

@@ -36,6 +36,7 @@ class FakePx4(FakeCopter):
     """One vehicle; `receive` and `advance` give back the bytes it says."""
 
     mav_type, autopilot = 2, 12
+    tells_all_modes = True
     boot_mode, own_mode, pilot_mode = AUTO_LOITER, AUTO_LOITER, POSCTL
     return_mode, land_mode, mission_mode = AUTO_RTL, AUTO_LAND, AUTO_MISSION
     missions = Px4Missions

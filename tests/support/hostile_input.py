@@ -18,6 +18,7 @@ from agent.vehicle.codec import _CONVERTERS
 from tests.support.bridge_flight import ORIGIN
 from tests.support.fake_copter import (
     ARM,
+    ASK,
     INTERVAL,
     REPOSITION,
     SET_MODE,
@@ -26,7 +27,7 @@ from tests.support.fake_copter import (
     FakeCopter,
 )
 from tests.support.fake_px4 import FakePx4
-from tests.support.mavlink_frames import crafted, frame, rebuilt, recorded
+from tests.support.mavlink_frames import LATER_IDS, MESSAGES, crafted, frame, rebuilt, recorded
 
 FLAVOURS: dict[str, type[FakeCopter]] = {"arducopter": FakeCopter, "px4": FakePx4}
 _RECORDINGS = Path("tests/data/recordings")
@@ -105,7 +106,7 @@ class Hostile:
     def _filled(self, message_id: int) -> bytes:
         """A message of that id with every field arbitrary, extreme or plausible."""
         random = self._random
-        kind = mavlink.mavlink_map[message_id]
+        kind = MESSAGES[message_id]
         size = kind.unpacker.size
         match random.randrange(4):
             case 0:
@@ -143,7 +144,7 @@ class Hostile:
         return random.randint(least, most)
 
     def _acknowledgement(self) -> bytes:
-        command = self._random.choice((SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, INTERVAL))
+        command = self._random.choice((SET_MODE, ARM, TAKEOFF, REPOSITION, SPEED, INTERVAL, ASK))
         result = self._random.choice((0, 0, 0, 1, 2, 3, 4, 5, 6, 9, 77))
         to = self._random.choice(((255, 191), (255, 191), (0, 0), (254, 190), (1, 1)))
         return self._frame(mavlink.MAVLink_command_ack_message(command, result, 0, 0, *to))
@@ -234,8 +235,8 @@ class Hostile:
                 return b"\xfd" + random.randbytes(9 + size)
 
 
-_KNOWN = [*sorted(_CONVERTERS), mavlink.MAVLINK_MSG_ID_STATUSTEXT]
-_ANY = sorted(mavlink.mavlink_map)
+_KNOWN = [*sorted(_CONVERTERS), mavlink.MAVLINK_MSG_ID_STATUSTEXT, *LATER_IDS]
+_ANY = sorted(MESSAGES)
 
 
 def _codes(form: str) -> list[str]:
@@ -261,7 +262,7 @@ def is_frame(piece: bytes) -> bool:
         and piece[0] == 0xFD
         and not piece[2] & _SIGNED
         and len(piece) == 12 + piece[1]
-        and int.from_bytes(piece[7:10], "little") in mavlink.mavlink_map
+        and int.from_bytes(piece[7:10], "little") in MESSAGES
     )
 
 

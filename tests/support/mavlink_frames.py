@@ -8,6 +8,15 @@ from pathlib import Path
 from typing import Any
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
+from pymavlink.dialects.v20 import development as later_dialect
+
+LATER_IDS = (435, 436, 437)
+"""Of the messages that only that dialect of pymavlink has, and the bridge reads."""
+MESSAGES: dict[int, Any] = {
+    **mavlink.mavlink_map,
+    **{each: later_dialect.mavlink_map[each] for each in LATER_IDS},
+}
+"""By id, what the bridge may be sent."""
 
 
 def frame(message: Any, system: int = 1, component: int = 1) -> bytes:
@@ -37,7 +46,7 @@ def rebuilt(row: dict[str, Any]) -> Any:
 
 def crafted(message_id: int, payload: bytes, system: int = 1, component: int = 1) -> bytes:
     """A frame of that message with any payload and a valid checksum."""
-    kind = mavlink.mavlink_map[message_id]
+    kind = MESSAGES[message_id]
     header = bytes([len(payload), 0, 0, 0, system, component]) + message_id.to_bytes(3, "little")
     crc: int = mavlink.x25crc(header + payload + bytes([kind.crc_extra])).crc
     return b"\xfd" + header + payload + crc.to_bytes(2, "little")

@@ -9,6 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import ClassVar
 
 from agent.vehicle.commands import result_text
@@ -45,6 +46,9 @@ _CMD_DO_FENCE_ENABLE = 207
 _CMD_COMPONENT_ARM_DISARM = 400
 _CUSTOM_MODE_ENABLED = 1.0
 _GROUND_SPEED = 1.0
+
+
+_NONE_TOLD: Mapping[int, str] = MappingProxyType({})
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,10 +119,16 @@ class Firmware(ABC):
         """The mode that a heartbeat tells."""
         return (custom_mode,)
 
-    def mode_name(self, custom_mode: int) -> str:
-        """The mode's name, for people."""
+    def mode_name(self, custom_mode: int, told: Mapping[int, str] = _NONE_TOLD) -> str:
+        """The mode's name, for people.
+
+        Args:
+            custom_mode: what the heartbeat says.
+            told: the vehicle's own names, for modes that we have none for.
+        """
         mode = self.mode(custom_mode)
-        return self.mode_names.get(mode, f"mode {'.'.join(map(str, mode))}")
+        number = f"mode {'.'.join(map(str, mode))}"
+        return self.mode_names.get(mode) or told.get(custom_mode, number)
 
     def is_commanded(self, custom_mode: int) -> bool:
         """Whether the vehicle takes our targets in that mode."""

@@ -175,6 +175,19 @@ class ArduCopterModel(FirmwareModel):
         set_mode_acknowledged_as=mavlink.MAVLINK_MSG_ID_SET_MODE,
     )
     mode_names = MappingProxyType({number: (mode, mode.value) for number, mode in _MODES.items()})
+    told_modes = MappingProxyType(
+        {
+            FlightMode.AUTO: "Auto",
+            FlightMode.STABILIZE: "Stabilize",
+            FlightMode.ALT_HOLD: "Altitude Hold",
+            FlightMode.LOITER: "Loiter",
+            FlightMode.GUIDED: "Guided",
+            FlightMode.LAND: "Land",
+            FlightMode.RTL: "RTL",
+            FlightMode.POSHOLD: "Position Hold",
+            FlightMode.BRAKE: "Brake",
+        }
+    )
     missions = MissionBehaviour(first_item=1, restarts=True, gives_way=True)
     refusals = RefusalCodes(
         not_now=mavlink.MAV_RESULT_FAILED,

@@ -197,6 +197,10 @@ class FirmwareModel(ABC):
     modes: ModeBehaviour
     mode_names: Mapping[int, tuple[FlightMode, str]]
     """By ``custom_mode``: the mode, and what the firmware calls it when it talks to people."""
+    told_modes: Mapping[FlightMode, str | int]
+    """What AVAILABLE_MODES tells, in that order: its name, or MAV_STANDARD_MODE of one without."""
+    tells_all_modes: bool = False
+    """Whether whoever asks for all modes hears of all, rather than of the first."""
     custom_mode_bits: int = -1
     """Those of ``custom_mode`` that say the mode; -1: all."""
     missions: MissionBehaviour

@@ -154,6 +154,21 @@ class Px4Model(FirmwareModel):
     mode_names = MappingProxyType(
         {_custom_mode(main, sub): named for (main, sub), named in _MODES.items()}
     )
+    told_modes = MappingProxyType(
+        {
+            FlightMode.MANUAL: "Manual",
+            FlightMode.ALT_HOLD: 4,
+            FlightMode.POSHOLD: 1,
+            FlightMode.AUTO: 6,
+            FlightMode.LOITER: "Hold",
+            FlightMode.RTL: 5,
+            FlightMode.STABILIZE: "Stabilized",
+            FlightMode.LAND: 8,
+            FlightMode.TAKEOFF: 7,
+        }
+    )
+    """As PX4 1.17 was seen to, without those that are not simulated."""
+    tells_all_modes = True
     custom_mode_bits = 0xFFFF0000
     missions = MissionBehaviour(
         asks_for_int=True,

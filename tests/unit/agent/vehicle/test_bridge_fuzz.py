@@ -5,7 +5,6 @@ from __future__ import annotations
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import Arrived, GoTo, HandedOver
 from agent.vehicle.codec import _CONVERTERS
@@ -22,7 +21,7 @@ from tests.support.fake_copter import (
     FakeCopter,
 )
 from tests.support.fake_px4 import FakePx4
-from tests.support.mavlink_frames import crafted
+from tests.support.mavlink_frames import MESSAGES, crafted
 
 FAKES = (FakeCopter, FakePx4)
 TARGET = (5.0, 30.0, 10.0)
@@ -35,7 +34,7 @@ known_frames = st.builds(
 )
 any_frames = st.builds(
     crafted,
-    message_id=st.sampled_from(sorted(mavlink.mavlink_map)),
+    message_id=st.sampled_from(sorted(MESSAGES)),
     payload=st.binary(min_size=1, max_size=255),
     system=st.sampled_from([1, 2]),
 )

@@ -39,7 +39,7 @@ from agent.vehicle.messages import (
     StatusText,
     SystemStatus,
 )
-from tests.support.mavlink_frames import crafted, frame, rebuilt, recorded
+from tests.support.mavlink_frames import MESSAGES, crafted, frame, rebuilt, recorded
 
 FIRMWARES = sorted(Path("tests/data/recordings").glob("*.jsonl"))
 RECORDINGS = sorted(Path("tests/data/recordings").glob("arducopter-*.jsonl"))
@@ -281,7 +281,7 @@ def test_garbage_never_raises(pieces: list[bytes]) -> None:
 
 
 @given(
-    message_id=st.sampled_from(sorted(mavlink.mavlink_map)),
+    message_id=st.sampled_from(sorted(MESSAGES)),
     payload=st.binary(min_size=1, max_size=255),
     system=st.integers(0, 255),
 )
