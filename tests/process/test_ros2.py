@@ -1,4 +1,7 @@
-"""`swarm ros2` beside missions flown by real processes, seen by another implementation."""
+"""`swarm ros2` beside missions flown by real processes, seen by another implementation.
+
+The fleet's own bus is encrypted; the ROS 2 graph beside it is not, as by default.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,9 @@ from typing import Any
 import pytest
 
 from coordinator.ros2.message_types import MessageTypes, definitions
+from swarm.identity.founding import found_authority
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.runtime.clock import unix_s
 from tests.process import ros2_reader
 from tests.process.by_hand import ByHand
 from tests.process.kept_open import KEEPER, kept_open
@@ -95,11 +100,13 @@ def read(port: str, folder: Path) -> dict[str, Any]:
 
 def test_another_implementation_reads_a_flown_mission_and_has_a_task_done(tmp_path: Path) -> None:
     write_definitions(tmp_path / "definitions")
+    keys = tmp_path / "keys"
+    found_authority(keys, MISSION.name, UAVS, now_s=unix_s())
     with contextlib.ExitStack() as stack:
         _, ros = stack.enter_context(router("--listen", "tcp/127.0.0.1:0"))
-        by_hand = ByHand(tmp_path, stack, kept_open(MISSION), speedup=6)
+        by_hand = ByHand(tmp_path, stack, kept_open(MISSION), speedup=6, keys=keys)
         words = ["ros2", "--mission", MISSION.name, "--services", "--ros-router", ros]
-        mirror = by_hand.start("ros2", [*words, *by_hand.seat])
+        mirror = by_hand.start("ros2", [*words, *by_hand.seat, *by_hand.keys_of("operator")])
         by_hand.coordinator("coordinator")
 
         seen = read(ros.rpartition(":")[2], tmp_path / "definitions")
