@@ -188,10 +188,8 @@ class Airway:
             return
         # Home, a vehicle goes down to its own layer above its start by itself.
         own_height |= isinstance(order, Return) and not order.land
-        now_s, climbs = self._mission_view.now_s, self._at_own_height or own_height
-        self._wish = Wish(
-            order, now_s, corners, own_height, fixed, climbs and not fixed, takes_s=takes_s
-        )
+        now_s, high = self._mission_view.now_s, self._at_own_height
+        self._wish = Wish(order, now_s, corners, own_height, fixed, high, takes_s=takes_s)
         self._aside = None
         if not self._aloft:
             self._stands_at = self._stands_at or self._fleet.standing()

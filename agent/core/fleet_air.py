@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -45,8 +46,8 @@ class Wish:
     """The height of its end is the task's."""
     fixed: bool = False
     """All of it is flown at the heights that it has."""
-    climbs: bool = False
-    """It leads to or from a height of a task's own."""
+    out_of_layer: bool = False
+    """It begins at the height of a task."""
     takes_s: float | None = None
     """How long its way takes, as reckoned [s]; None: nobody has said."""
     retry_at_s: float = -math.inf
@@ -54,6 +55,11 @@ class Wish:
     """Whether the own claim asks for it."""
     yielded: set[tuple[str, int]] = field(default_factory=set)
     """Requests of others to which it has given way."""
+
+    @property
+    def climbs(self) -> bool:
+        """Whether it leads from the layer, or to it."""
+        return (self.out_of_layer or self.own_height) and not self.fixed
 
     @property
     def end_enu_m(self) -> Point | None:
@@ -104,10 +110,8 @@ class FleetAir:
             shifts_m = [0.0]
         if not aside and wish.climbs:  # straight, or in a layer between two climbs
             yield 0.0, wish.corners_enu_m
-            *between, (east_m, north_m, up_m) = wish.corners_enu_m
-            level = tuple((east_m, north_m, me.layer_m) for east_m, north_m, _ in between)
-            last = (east_m, north_m, me.layer_m if wish.own_height else up_m)
-            yield from ((shift_m, (*level, last)) for shift_m in shifts_m)
+            level = self._in_layer(wish, me.layer_m)
+            yield from ((shift_m, level) for shift_m in shifts_m)
             return
         if not aside:
             yield from ((shift_m, wish.corners_enu_m) for shift_m in shifts_m)
@@ -115,7 +119,8 @@ class FleetAir:
         (east_m, north_m, up_m), *_ = wish.corners_enu_m
         others_m = [shift_m for shift_m in shifts_m if abs(shift_m - now_shift_m) > 1e-6]
         yield from ((shift_m, wish.corners_enu_m[:1]) for shift_m in others_m)
-        if waits:
+        hilly = self._brief is not None and self._brief.terrain is not None
+        if waits or hilly:
             return
         for away in _ASIDE_M:
             for turn in range(_DIRECTIONS):
@@ -185,6 +190,25 @@ class FleetAir:
         stands = claim is not None and claim.stage in (BaseStage.LANDED, BaseStage.PARKED)
         return (
             (claim.base, claim.stage) if stands and claim and claim.base and claim.stage else None
+        )
+
+    def _in_layer(self, wish: Wish, layer_m: float) -> tuple[Point, ...]:
+        """The corners of a way with its ends in the layer: to be climbed to and left upright.
+
+        Over hills a way to or from a height of a task's own lacks some of the layer, evenly more
+        towards that end; what is added brings it nowhere nearer to the ground.
+        """
+        corners = wish.corners_enu_m
+        if self._brief is None or self._brief.terrain is None:
+            *between, (east_m, north_m, up_m) = corners
+            last = (east_m, north_m, layer_m if wish.own_height else up_m)
+            return (*((east_m, north_m, layer_m) for east_m, north_m, _ in between), last)
+        along_m = [0.0, *accumulate(math.dist(a[:2], b[:2]) for a, b in pairwise(corners))]
+        lack_m = [layer_m * wish.out_of_layer, layer_m * wish.own_height]
+        return tuple(
+            (east_m, north_m, up_m + lack_m[0] + share * (lack_m[1] - lack_m[0]))
+            for (east_m, north_m, up_m), at_m in zip(corners, along_m, strict=True)
+            for share in [at_m / along_m[-1] if along_m[-1] > 0.0 else 1.0]
         )
 
     # -- the others ------------------------------------------------------------------------------

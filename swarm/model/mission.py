@@ -235,12 +235,10 @@ class Mission:
             raise ValueError(f"zone_margin_m must be >= 0, not {self.zone_margin_m}")
         if self.separation_m is not None and not 0.0 < self.separation_m < math.inf:
             raise ValueError(f"separation_m must be > 0, not {self.separation_m}")
-        if self.separation_m is not None and self.terrain is not None:
-            raise ValueError("separation_m is not known beside a terrain")
         if self.band_m is not None and not 0.0 <= self.band_m[0] < self.band_m[1] < math.inf:
             raise ValueError(f"band_m must be two growing heights >= 0, not {self.band_m}")
         if self.band_m is not None and self.terrain is not None:
-            raise ValueError("band_m is not known beside a terrain")
+            self.terrain.check_band(self.band_m)
 
     @property
     def constraints(self) -> tuple[str, ...]:

@@ -9,6 +9,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+import numpy as np
+
 STEP_M = 0.1
 """Heights are whole multiples of it above the lowest [m]."""
 MOST_STEPS = 2**16 - 1
@@ -67,6 +69,22 @@ class Terrain:
     def rows(self) -> int:
         """Of heights."""
         return len(self.steps) // 2 // self.columns
+
+    def check_band(self, band_m: tuple[float, float]) -> None:
+        """Refuse heights above the ground that come too near to it.
+
+        Raises:
+            ValueError: the lowest is less than paths are planned at.
+        """
+        if band_m[0] < self.planned_m:
+            raise ValueError(
+                f"band_m must begin at {self.planned_m:g} or higher, not {band_m[0]:g}"
+            )
+
+    @property
+    def highest_m(self) -> float:
+        """The greatest height [m above the mission origin]."""
+        return self.lowest_m + STEP_M * int(np.frombuffer(self.steps, dtype="<u2").max())
 
     @property
     def planned_m(self) -> float:

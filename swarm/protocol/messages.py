@@ -149,9 +149,7 @@ class MissionConfig(Checked):
         if self.band_m is not None and self.band_m[0] >= self.band_m[1]:
             raise ValueError(f"band_m must be two growing heights, not {self.band_m}")
         if self.band_m is not None and self.terrain is not None:
-            raise ValueError("band_m is not known beside a terrain")
-        if self.separation_m is not None and self.terrain is not None:
-            raise ValueError("separation_m is not known beside a terrain")
+            self.terrain.terrain().check_band(self.band_m)
 
 
 class MissionPhase(StrEnum):

@@ -31,12 +31,6 @@ def terrain_faults(document: Document) -> Iterator[Finding]:
         remedy = "add a table [origin] with lat_deg, lon_deg and alt_m"
         yield Finding(("terrain",), "where the ground is takes an origin", remedy)
     mission = document.get("mission")
-    if isinstance(mission, Mapping) and "band_m" in mission:
-        problem = "is not known beside [terrain]: every UAV keeps to its layer above the ground"
-        yield Finding(("mission", "band_m"), problem, "leave it out")
-    if isinstance(mission, Mapping) and "separation_m" in mission:
-        problem = "is not known beside [terrain]: layers over hills are not shared yet"
-        yield Finding(("mission", "separation_m"), problem, "leave it out")
     for name in ("uav", "base", "task"):
         for index, entry in entries(document, name):
             if "alt_m" in entry:
@@ -48,6 +42,12 @@ def terrain_faults(document: Document) -> Iterator[Finding]:
     if clearance_m is None:
         return
     least_m = clearance_m + LEEWAY_M
+    band_m = mission.get("band_m") if isinstance(mission, Mapping) else None
+    lowest_m = number_of(band_m[0]) if isinstance(band_m, list) and band_m else None
+    if lowest_m is not None and 0.0 <= lowest_m < least_m:
+        problem = f"begins {shown(lowest_m)} above the ground, too near to clearance_m"
+        remedy = f"begin at {least_m:g} or higher: vehicles cut corners and sag"
+        yield Finding(("mission", "band_m"), problem, remedy)
     for name in ("task", "area"):
         for index, entry in entries(document, name):
             height_m = number_of(entry.get("height_m"))

@@ -19,7 +19,8 @@ import numpy as np
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
-from swarm.separation.slabs import Path, Slabs, apart, keeper_seats, shared_layers_m
+from swarm.separation.fleet_layers import slabs_over
+from swarm.separation.slabs import Path, Slabs, apart, keeper_seats
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,13 +43,14 @@ class SharedAir:
     def __init__(self, slabs: Slabs, fleet: Sequence[Starter]) -> None:
         self.slabs = slabs
         self._uavs = [starter.uav for starter in fleet]
-        rows = keeper_seats(len(slabs), len(fleet))
+        self._stacks = slabs.stacks
+        rows = keeper_seats(len(self._stacks), len(fleet), level=slabs.level)
         self._first = [self._uavs[row] for each in rows for row in each]
         """By seat, who sits there first."""
-        self._slab_of = [slab for slab, each in enumerate(rows) for _ in each]
+        self._stack_of = [stack for stack, each in enumerate(rows) for _ in each]
         self._seats = [
-            [seat for seat, its in enumerate(self._slab_of) if its == slab]
-            for slab in range(len(slabs))
+            [seat for seat, its in enumerate(self._stack_of) if its == stack]
+            for stack in range(len(rows))
         ]
         self._unsaid = {
             starter.uav: ClaimedWay(0, (starter.hovers_enu_m,), flies=True) for starter in fleet
@@ -161,12 +163,18 @@ class SharedAir:
         grounded: bool = False,
     ) -> bool:
         """Whether enough of those who keep the air of ``path`` could hear a request."""
-        for slab in self.slabs.asked(path, grounded=grounded):
-            holders = [self.holder(seat, claims, expired) for seat in self._seats[slab]]
+        for seats in self._asked_seats(self.slabs.asked(path, grounded=grounded)):
+            holders = [self.holder(seat, claims, expired) for seat in seats]
             heard = sum(holder is not None and reaches(holder) for holder in holders)
             if heard < _majority(len(holders)):
                 return False
         return True
+
+    def _asked_seats(self, asked: frozenset[int]) -> Iterator[list[int]]:
+        """By stack of which any slab is asked for."""
+        for stack, seats in zip(self._stacks, self._seats, strict=True):
+            if stack & asked:
+                yield seats
 
     def inherited(
         self,
@@ -187,7 +195,9 @@ class SharedAir:
             if now != uav or not before:
                 continue
             known = all(each and self._is_settled(each, claims, heard, expired) for each in before)
-            if seat in told or (known and self._fits(uav, self._slab_of[seat], claims, expired)):
+            if seat in told or (
+                known and self._fits(uav, self._stacks[self._stack_of[seat]], claims, expired)
+            ):
                 found.append(seat)
         return tuple(found)
 
@@ -213,10 +223,13 @@ class SharedAir:
         )
 
     def _fits(
-        self, keeper: str, slab: int, claims: Mapping[str, Claim], expired: Collection[str]
+        self,
+        keeper: str,
+        within: frozenset[int],
+        claims: Mapping[str, Claim],
+        expired: Collection[str],
     ) -> bool:
-        """Whether requests that ``keeper`` has granted, and that wait, meet nobody in ``slab``."""
-        within = frozenset({slab})
+        """Whether requests that ``keeper`` has granted, and that wait, meet nobody in slabs."""
         grants = self._binding(keeper, claims, expired)
         for uav, number in self.way(keeper, claims).grants.items():
             way = None if uav not in self._unsaid else self.way(uav, claims)
@@ -309,14 +322,14 @@ class SharedAir:
 
         On the last seat of a slab it is not as long as all others there are heard.
         """
-        mine, needed = set(), set()
-        for slab, seats in enumerate(self._seats):
+        mine, needed = set[int](), set[int]()
+        for stack, seats in zip(self._stacks, self._seats, strict=True):
             sitting = [self._sitting(seat, claims, expired) for seat in seats]
             if keeper in sitting:
-                mine.add(slab)
+                mine |= stack
                 first = sitting[: _majority(len(seats))]
                 if not all(each in heard and each != keeper for each in first):
-                    needed.add(slab)
+                    needed |= stack
         return frozenset(mine), frozenset(needed)
 
     def _sitting(
@@ -341,8 +354,8 @@ class SharedAir:
         """
         way = self.way(uav, claims)
         path = self.wanted(uav, way)
-        for slab in self.slabs.asked(path, grounded=way.grounded):
-            seats, grants = self._seats[slab], 0
+        for seats in self._asked_seats(self.slabs.asked(path, grounded=way.grounded)):
+            grants = 0
             for seat in seats:
                 keeper = self._sitting(seat, claims, expired)
                 granted = keeper is not None and self.way(keeper, claims).grants.get(uav)
@@ -390,9 +403,10 @@ def air_of_brief(brief: MissionConfig) -> SharedAir | None:
     if brief.separation_m is None or not brief.uavs:
         return None
     lowest_m = min(uav.layer_m for uav in brief.uavs)
-    layers_m = shared_layers_m(brief.separation_m, len(brief.uavs), brief.band_m, lowest_m)
+    terrain = None if brief.terrain is None else brief.terrain.terrain()
+    slabs = slabs_over(terrain, brief.separation_m, len(brief.uavs), brief.band_m, lowest_m)
     fleet = []
     for uav in brief.uavs:
         east_m, north_m, up_m = uav.position_enu_m
         fleet.append(Starter(uav.id, (east_m, north_m, up_m + uav.layer_m)))
-    return SharedAir(Slabs(brief.separation_m, layers_m), fleet)
+    return SharedAir(slabs, fleet)

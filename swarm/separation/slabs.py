@@ -1,14 +1,17 @@
-"""Height layers that a fleet shares, and the slabs of air round them.
+"""Height layers that a fleet shares, and the slabs into which the air is cut.
 
-A slab reaches half-way to the neighbouring layers; the lowest and the highest have no end. Two
-paths that come closer than the separation anywhere are both within half of it from one slab at
-least, so whoever keeps the paths of each slab apart, as seen from above, keeps all apart.
+A slab reaches half-way to the neighbouring layers; the lowest and the highest have no end. Over
+hills, where a layer is as high above the ground and so not level, slabs are so thin that what is a
+layer apart touches none in common. Two paths that come closer than the separation anywhere are both
+within half of it from one slab at least, so whoever keeps the paths of each slab apart, as seen
+from above, keeps all apart.
 """
 
 from __future__ import annotations
 
 import itertools
 import math
+from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -21,11 +24,15 @@ Path = npt.NDArray[np.float64]
 hovers."""
 
 SEATS = 3
-"""Keepers of a slab where there are more UAVs than slabs; two of them grant."""
+"""Keepers of a stack where not each UAV has air of its own; two of them grant."""
 POSITION_ERROR_M = 1.0
 """By which a UAV may be elsewhere, or higher or lower, than it takes itself to be [m]."""
 _ROUNDED_M = 1e-6
 """What is forgiven of a distance that was planned to be just as large as asked."""
+_MOST_SLABS = 256
+"""Over ground whose heights differ more, slabs are thicker."""
+_MANY = 2
+"""Slabs that two paths have in common, beyond which they are first seen as a whole."""
 
 
 def planned_apart_m(separation_m: float) -> float:
@@ -60,34 +67,67 @@ def shared_layers_m(
 
 @dataclass(frozen=True, slots=True)
 class Slabs:
-    """The air, cut at heights between shared layers.
+    """The air, cut at heights.
 
     Raises:
-        ValueError: heights do not grow by `planned_apart_m` at least, or there are none.
+        ValueError: layers do not grow by `planned_apart_m` at least, or there are none, or cuts do
+            not grow.
     """
 
     separation_m: float
     """Smallest distance of two UAVs [m]."""
     layers_m: tuple[float, ...]
-    """Heights of the layers over a place at the height of the mission's origin [m]."""
+    """Heights of the layers above the places that are visited [m]."""
+    cuts_m: tuple[float, ...]
+    """Where one slab ends and the next begins, lowest first [m above the mission origin]."""
+    level: bool = True
+    """Whether layers are level, so that each has a slab of its own."""
 
     def __post_init__(self) -> None:
         gaps_m = np.diff(self.layers_m)
         least_m = planned_apart_m(self.separation_m) - _ROUNDED_M
         if not self.layers_m or (gaps_m < least_m).any():
             raise ValueError(f"layers {self.layers_m} are nearer than {least_m:g} m")
+        if (np.diff(self.cuts_m) <= 0.0).any():
+            raise ValueError(f"cuts {self.cuts_m} do not grow")
+
+    @classmethod
+    def between(cls, separation_m: float, layers_m: tuple[float, ...]) -> Slabs:
+        """Of a mission whose places are all about as high as its origin: one round each layer."""
+        cuts_m = tuple(0.5 * (low_m + high_m) for low_m, high_m in itertools.pairwise(layers_m))
+        return cls(separation_m, layers_m, cuts_m)
+
+    @classmethod
+    def over(
+        cls, separation_m: float, layers_m: tuple[float, ...], ground_m: tuple[float, float]
+    ) -> Slabs:
+        """Over ground of such heights [m above the mission origin], the lowest and the greatest.
+
+        Two who are level and a layer apart are both near no slab as thin as what layers are farther
+        apart than the separation.
+        """
+        low_m, high_m = ground_m[0] + layers_m[0], ground_m[1] + layers_m[-1]
+        thin_m = planned_apart_m(separation_m) - separation_m
+        count = max(2, min(_MOST_SLABS, math.ceil((high_m - low_m) / thin_m)))
+        thick_m = max(thin_m, (high_m - low_m) / count)
+        cuts_m = tuple(low_m + each * thick_m for each in range(1, count))
+        return cls(separation_m, layers_m, cuts_m, level=False)
 
     def __len__(self) -> int:
-        return len(self.layers_m)
+        return len(self.cuts_m) + 1
+
+    @property
+    def stacks(self) -> tuple[frozenset[int], ...]:
+        """Neighbouring slabs that the same UAVs keep: as many stacks as layers."""
+        count = min(len(self.layers_m), len(self))
+        ends = [stack * len(self) // count for stack in range(count + 1)]
+        return tuple(frozenset(range(low, high)) for low, high in itertools.pairwise(ends))
 
     def reach_m(self, slab: int) -> tuple[float, float]:
         """Heights from which one may come too near to somebody in ``slab`` [m]."""
-        heights_m, near_m = self.layers_m, 0.5 * self.separation_m
-        low_m, high_m = -math.inf, math.inf
-        if slab > 0:
-            low_m = 0.5 * (heights_m[slab - 1] + heights_m[slab]) - near_m
-        if slab + 1 < len(heights_m):
-            high_m = 0.5 * (heights_m[slab] + heights_m[slab + 1]) + near_m
+        near_m = 0.5 * self.separation_m
+        low_m = self.cuts_m[slab - 1] - near_m if slab > 0 else -math.inf
+        high_m = self.cuts_m[slab] + near_m if slab < len(self.cuts_m) else math.inf
         return low_m, high_m
 
     def touched(self, path_enu_m: Path) -> frozenset[int]:
@@ -95,12 +135,10 @@ class Slabs:
         if not len(path_enu_m):
             return frozenset()
         lowest_m, highest_m = float(path_enu_m[:, 2].min()), float(path_enu_m[:, 2].max())
-        reaches_m = [self.reach_m(slab) for slab in range(len(self))]
-        return frozenset(
-            slab
-            for slab, (low_m, high_m) in enumerate(reaches_m)
-            if lowest_m < high_m and highest_m > low_m
-        )
+        near_m = 0.5 * self.separation_m
+        first = bisect_right(self.cuts_m, lowest_m, key=lambda cut_m: cut_m + near_m)
+        last = bisect_left(self.cuts_m, highest_m, key=lambda cut_m: cut_m - near_m)
+        return frozenset(range(first, last + 1))
 
     def asked(self, path_enu_m: Path, *, grounded: bool = False) -> frozenset[int]:
         """Slabs whose keepers are to be asked before ``path_enu_m`` is flown.
@@ -137,6 +175,12 @@ def apart(
     """
     common = slabs.touched(one_enu_m) & slabs.touched(other_enu_m)
     asked_m = planned_apart_m(slabs.separation_m) - _ROUNDED_M
+    if len(common) > _MANY:
+        ones, others = (
+            _flat_pieces(path, -math.inf, math.inf) for path in (one_enu_m, other_enu_m)
+        )
+        if least_flat_m(ones, others) >= asked_m:
+            return True
     for slab in common if within is None else common & within:
         low_m, high_m = slabs.reach_m(slab)
         mine, its = _flat_pieces(one_enu_m, low_m, high_m), _flat_pieces(other_enu_m, low_m, high_m)
@@ -248,8 +292,8 @@ def start_layers(
     chosen: list[int] = []
     paths: list[Path] = []
     for (east_m, north_m, up_m), first in zip(starts_enu_m, preferred, strict=True):
-        for step in range(len(slabs)):
-            layer = (first + step) % len(slabs)
+        for step in range(len(slabs.layers_m)):
+            layer = (first + step) % len(slabs.layers_m)
             path = np.array([[east_m, north_m, up_m + slabs.layers_m[layer]]])
             if all(apart(slabs, path, other) for other in paths):
                 chosen.append(layer)
@@ -267,10 +311,13 @@ def keeper_rows(n_slab: int, n_uav: int) -> tuple[int, ...]:
     return tuple(slab * n_uav // n_slab for slab in range(n_slab))
 
 
-def keeper_seats(n_slab: int, n_uav: int) -> tuple[tuple[int, ...], ...]:
-    """By slab, the UAVs that keep it together first: three, or one where each can have its own."""
-    rows = keeper_rows(n_slab, n_uav)
-    if n_uav <= n_slab or n_uav < SEATS:
+def keeper_seats(n_stack: int, n_uav: int, *, level: bool = True) -> tuple[tuple[int, ...], ...]:
+    """By stack, the UAVs that keep it together first.
+
+    Three, or one where each can have air of its own: over hills no way stays in one stack.
+    """
+    rows = keeper_rows(n_stack, n_uav)
+    if (level and n_uav <= n_stack) or n_uav < SEATS:
         return tuple((row,) for row in rows)
     apart = n_uav // SEATS
     return tuple(tuple((row + seat * apart) % n_uav for seat in range(SEATS)) for row in rows)

@@ -9,6 +9,7 @@ import math
 
 from swarm.protocol.events import Cell
 from swarm.protocol.messages import MissionConfig
+from swarm.separation.shared_air import air_of_brief
 from swarm.separation.slabs import POSITION_ERROR_M, planned_apart_m
 from swarm.separation.tactical_motion import Agility, Place
 from swarm.separation.tactical_traffic import TrafficRules
@@ -29,7 +30,11 @@ def rules_of(brief: MissionConfig) -> TrafficRules | None:
     slowest_m_s2 = min(_SURELY_M_S2, min(told_m_s2, default=math.inf))
     flown_m = [uav.position_enu_m[2] + uav.layer_m for uav in brief.uavs]
     low_m, high_m = min(flown_m), max(flown_m)
-    if brief.band_m is not None:
+    if brief.terrain is not None and (air := air_of_brief(brief)) is not None:
+        # Who makes room is kept from the ground by its bridge.
+        terrain, layers_m = brief.terrain.terrain(), air.slabs.layers_m
+        low_m, high_m = terrain.lowest_m + layers_m[0], terrain.highest_m + layers_m[-1]
+    elif brief.band_m is not None:
         high_m = max(high_m, low_m - brief.band_m[0] + brief.band_m[1])
     else:
         high_m += 2.0 * planned_apart_m(brief.separation_m)

@@ -85,9 +85,12 @@ class FieldNetwork:
         self._ground: Ground | None = None
         if mission.terrain is not None:
             self._ground = ground_of(mission.terrain)
+            highest_m = max(self._layers_m, default=0.0)
+            if self._band_m is not None:
+                highest_m = max(highest_m, self._band_m[1])
+            zones = tuple(_zones_over(self._ground, mission, highest_m))
             # Heights over the ground follow from the paths: zones that could matter, matter.
             self._band_m = -np.inf, np.inf
-            zones = tuple(_zones_over(self._ground, mission, max(self._layers_m, default=0.0)))
         self._airspace = Airspace(zones, mission.zone_margin_m)
         flown = [_points(task, self._ground) for task in tasks]
         self.node_enu_m, self.enter, self._in_layer = _nodes(uavs, mission.bases, tasks, flown)

@@ -12,11 +12,11 @@ from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, Starter
 from swarm.separation.slabs import Slabs, apart
 
-SLABS = Slabs(10.0, (30.0, 42.0))
+SLABS = Slabs.between(10.0, (30.0, 42.0))
 FLEET = [Starter(f"u{k}", (100.0 * k, 0.0, 30.0)) for k in range(3)]
 TOGETHER = SharedAir(SLABS, FLEET)
 """Three on two slabs keep each of them together."""
-ALONE = SharedAir(Slabs(10.0, (30.0, 42.0, 54.0)), FLEET)
+ALONE = SharedAir(Slabs.between(10.0, (30.0, 42.0, 54.0)), FLEET)
 """Each has a slab of its own."""
 ALL = {"u0", "u1", "u2"}
 
@@ -187,7 +187,7 @@ class Sky:
 
     def __init__(self, rng: np.random.Generator) -> None:
         n_uav, n_slab = int(rng.integers(2, 7)), int(rng.integers(1, 5))
-        self.slabs = Slabs(10.0, tuple(30.0 + 12.0 * k for k in range(n_slab)))
+        self.slabs = Slabs.between(10.0, tuple(30.0 + 12.0 * k for k in range(n_slab)))
         fleet = [
             Starter(f"u{k}", (40.0 * k, 0.0, self.slabs.layers_m[k % n_slab])) for k in range(n_uav)
         ]

@@ -21,7 +21,7 @@ from swarm.separation.slabs import (
     start_layers,
 )
 
-SLABS = Slabs(10.0, (30.0, 42.0, 54.0))
+SLABS = Slabs.between(10.0, (30.0, 42.0, 54.0))
 
 
 def path_of(rng: np.random.Generator, slabs: Slabs) -> np.ndarray:
@@ -53,6 +53,57 @@ def test_paths_that_are_apart_have_no_two_points_nearer_than_the_separation(seed
     if apart(SLABS, one, other):
         assert gaps.min() >= SLABS.separation_m - 1e-9  # above each other; beside it is more
     assert apart(SLABS, one, other) == apart(SLABS, other, one)
+
+
+@given(seed=st.integers(0, 2**32 - 1), relief_m=st.floats(0.0, 900.0))
+def test_paths_over_hills_that_are_apart_have_no_two_points_nearer(
+    seed: int, relief_m: float
+) -> None:
+    rng = np.random.default_rng(seed)
+    slabs = Slabs.over(10.0, (30.0, 42.0, 54.0), (-20.0, relief_m - 20.0))
+    one, other = (
+        np.column_stack([each[:, :2], each[:, 2] + rng.uniform(-30.0, min(relief_m, 60.0))])
+        for each in (path_of(rng, slabs), path_of(rng, slabs))
+    )
+    gaps = np.linalg.norm(sampled(one)[:, None] - sampled(other)[None], axis=2)
+    if apart(slabs, one, other):
+        assert gaps.min() >= slabs.separation_m - 1e-9
+    elif least_flat_m(flat(one), flat(other)) >= slabs.separation_m + 2.0:
+        raise AssertionError("what is apart as seen from above is apart")
+    assert apart(slabs, one, other) == apart(slabs, other, one)
+    for path in (one, other):
+        reaches_m = [slabs.reach_m(slab) for slab in range(len(slabs))]
+        assert slabs.touched(path) == {
+            slab
+            for slab, (low_m, high_m) in enumerate(reaches_m)
+            if path[:, 2].min() < high_m and path[:, 2].max() > low_m
+        }
+
+
+def flat(path: np.ndarray) -> np.ndarray:
+    """Its pieces, seen from above."""
+    ends = np.concatenate([path, path[-1:]])[:, :2]
+    return np.stack([ends[:-1], ends[1:]], axis=1)
+
+
+@given(up_m=st.floats(-50.0, 400.0), relief_m=st.floats(0.0, 400.0))
+def test_over_hills_level_flight_a_layer_higher_touches_nothing_in_common(
+    up_m: float, relief_m: float
+) -> None:
+    slabs = Slabs.over(10.0, (30.0, 42.0), (0.0, relief_m))
+    crossing = np.array([[0.0, 0.0, up_m], [50.0, 50.0, up_m]])
+    higher = crossing + np.array([0.0, 0.0, 12.0 + 1e-6])
+    inside = 30.0 < up_m < relief_m + 30.0
+
+    assert not (slabs.touched(crossing) & slabs.touched(higher)) or not inside
+    assert apart(slabs, crossing, higher) or not inside
+    assert not apart(slabs, crossing, crossing + np.array([0.0, 0.0, 9.9]))
+
+
+def test_over_mountains_slabs_are_thicker_and_not_more() -> None:
+    slabs = Slabs.over(10.0, (30.0, 42.0), (0.0, 3000.0))
+    assert len(slabs) == 256
+    assert slabs.cuts_m[1] - slabs.cuts_m[0] == pytest.approx(3012.0 / 256)
 
 
 @given(seed=st.integers(0, 2**32 - 1))
@@ -131,7 +182,7 @@ def test_without_a_band_everybody_finds_a_layer() -> None:
 
 def test_layers_that_are_too_near_are_refused() -> None:
     with pytest.raises(ValueError, match="nearer than 12 m"):
-        Slabs(10.0, (30.0, 40.0))
+        Slabs.between(10.0, (30.0, 40.0))
 
 
 def test_starts_that_are_near_each_other_have_layers_that_differ() -> None:

@@ -1,0 +1,60 @@
+"""UAVs that share layers over hills keep apart, and off the ground."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from sim.faults.case import quick_plan
+from sim.world.simulation import SimulatedMission, simulate_mission
+from sim.world.uncertainty import Uncertainty
+from swarm.model import Mission
+from swarm.scenario import load_scenario
+from swarm.scenario.files import resolve_scenario
+from tests.support.hilly_fleet import hilly_mission
+
+
+def fly(mission: Mission) -> SimulatedMission:
+    return simulate_mission(
+        mission, method="greedy", seed=1, uncertainty=Uncertainty(), planner=quick_plan
+    )
+
+
+def assert_kept(mission: Mission, flown: SimulatedMission) -> None:
+    """Nobody nearer to anybody than the separation, nor to the ground than the clearance."""
+    assert mission.terrain is not None
+    assert mission.separation_m is not None
+    nearest_m, lowest_m = flown.world.closest_approach_m(), flown.world.lowest_clearance_m()
+    assert nearest_m is not None
+    assert lowest_m is not None
+    assert nearest_m >= mission.separation_m - 1e-6
+    assert lowest_m >= mission.terrain.clearance_m
+
+
+def test_the_ridge_is_crossed_by_all_in_two_layers() -> None:
+    ridge = load_scenario(resolve_scenario("ridge"))
+    mission = replace(ridge, separation_m=12.0, band_m=(20.0, 34.5))
+    flown = fly(mission)
+
+    assert_kept(mission, flown)
+    assert sorted(flown.result.done) == sorted(task.id for task in ridge.tasks)
+
+
+@pytest.mark.parametrize(
+    "seed", [*range(3), *(pytest.param(s, marks=pytest.mark.slow) for s in range(3, 25))]
+)
+def test_random_hills_are_crossed_without_coming_near_to_anybody(seed: int) -> None:
+    mission = hilly_mission(seed)
+    flown = fly(mission)
+
+    assert_kept(mission, flown)
+    assert sorted(flown.result.done) == sorted(task.id for task in mission.tasks)
+
+
+def test_without_a_separation_some_would_meet() -> None:
+    nearest_m = [
+        fly(replace(hilly_mission(seed), separation_m=None, band_m=None)).world.closest_approach_m()
+        for seed in range(3)
+    ]
+    assert min(each for each in nearest_m if each is not None) < 6.0
