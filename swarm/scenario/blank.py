@@ -76,7 +76,8 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "separation_m": "Smallest distance of two UAVs in flight [m]. Absent: each keeps to a "
         "height of its own, 3 m from the next one's, and nothing else keeps them apart.",
         "band_m": "Lowest and highest height above the ground that may be used [m]; with a "
-        "separation_m all UAVs share the layers in it. Absent: each flies in a layer of its own.",
+        "separation_m all UAVs share the layers in it. Absent: each flies in a layer of its own. "
+        "Beside [terrain] it begins at clearance_m + 3 or higher.",
     },
     "origin": {
         "lat_deg": "Latitude and longitude (WGS84) of the place where position_m is [0, 0] [deg]. "

@@ -39,6 +39,29 @@ def test_a_brief_brings_the_very_ground_of_the_mission() -> None:
     assert brief.uavs[0].layer_m == 23.0  # clearance and what plans keep beyond
 
 
+def test_a_brief_brings_the_band_over_the_ground() -> None:
+    kept = replace(mission(hills(1)), separation_m=10.0, band_m=(30.0, 60.0))
+    brief = mission_config_of(kept, FlightLayers(), 1)
+    said = encode(Message("hills", "coordinator", Stamp(1, 1), brief))
+    heard = Codec("hills").decode("swarm/hills/brief", said)
+
+    assert heard is not None
+    assert heard.body == brief
+    assert brief.uavs[0].layer_m == 30.0
+    with pytest.raises(ValueError, match="must begin at 23 or higher"):
+        replace(brief, band_m=(22.0, 60.0))
+    with pytest.raises(ValueError, match="must begin at 23 or higher"):
+        replace(kept, band_m=(22.0, 60.0))
+
+
+def test_layers_of_their_own_lie_in_the_band() -> None:
+    fleet = [Uav(UavId(f"u{k}"), (30.0 * k, 0.0, 5.0), 10.0) for k in range(5)]
+    kept = replace(mission(hills(1)), uavs=tuple(fleet), band_m=(30.0, 34.0))
+    brief = mission_config_of(kept, FlightLayers(), 1)
+
+    assert [uav.layer_m for uav in brief.uavs] == [30.0, 31.0, 32.0, 33.0, 34.0]
+
+
 def test_the_roughest_ground_there_can_be_has_room_in_a_message() -> None:
     steps = np.random.default_rng(0).integers(0, 2**16, MOST_HEIGHTS).astype("<u2")
     rough = Terrain(20.0, 0.0, 0.0, 1.0, 1.0, 512, 0.0, steps.tobytes())

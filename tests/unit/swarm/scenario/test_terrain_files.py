@@ -160,6 +160,22 @@ def test_a_mission_is_written_with_the_file_of_its_ground(tmp_path: Path) -> Non
     assert again.terrain.file == str((tmp_path / "hills.tif").resolve())
 
 
+def test_a_band_and_a_separation_over_hills_are_read_and_written(tmp_path: Path) -> None:
+    geotiff(tmp_path / "hills.tif", wgs84_slope())
+    flat = format_scenario(load(tmp_path, "hills.tif"))
+    shared = "[mission]\nseparation_m = 10.0\nband_m = [30.0, 55.0]\n"
+    (tmp_path / "shared.toml").write_text(flat.replace("[mission]\n", shared, 1))
+    mission = load_scenario(tmp_path / "shared.toml")
+
+    assert (mission.separation_m, mission.band_m) == (10.0, (30.0, 55.0))
+    assert mission.terrain is not None
+    assert parse_scenario(format_scenario(mission).encode(), "again.toml") == mission
+    low = shared.replace("30.0, 55.0", "20.0, 55.0")
+    (tmp_path / "low.toml").write_text(flat.replace("[mission]\n", low, 1))
+    with pytest.raises(InputError, match=r"mission\.band_m: begins 20\.0 above the ground"):
+        load_scenario(tmp_path / "low.toml")
+
+
 def test_a_mission_whose_file_is_not_known_is_written_as_high_as_it_is(tmp_path: Path) -> None:
     geotiff(tmp_path / "hills.tif", wgs84_slope())
     mission = load(tmp_path, "hills.tif")

@@ -18,6 +18,8 @@ TOGETHER = SharedAir(SLABS, FLEET)
 """Three on two slabs keep each of them together."""
 ALONE = SharedAir(Slabs.between(10.0, (30.0, 42.0, 54.0)), FLEET)
 """Each has a slab of its own."""
+HILLY = SharedAir(Slabs.over(10.0, (30.0, 42.0, 54.0), (0.0, 60.0)), FLEET)
+"""Over hills they keep all of it together, however many layers there are."""
 ALL = {"u0", "u1", "u2"}
 
 
@@ -64,6 +66,36 @@ def test_a_way_can_be_asked_for_while_most_of_its_keepers_are_there() -> None:
     assert TOGETHER.can_grant(path, {}, (), {"u1", "u2"}.__contains__)
     assert not TOGETHER.can_grant(path, {}, (), {"u2"}.__contains__)
     assert not ALONE.can_grant(path, {}, (), {"u1", "u2"}.__contains__)
+
+
+def test_over_hills_a_lost_keeper_is_not_missed_by_ways_that_climb_through_all() -> None:
+    """It asks for two of the three stacks; of these u0 sits first on one, u1 on the other."""
+    over = asks(1, (200.0, 0.0, 30.0), (250.0, 0.0, 70.0), (300.0, 0.0, 30.0))
+    claims = {"u2": claim(over)}
+    path = np.array(over.path_enu_m)
+    for lost in ("u0", "u1"):
+        (left,) = {"u0", "u1"} - {lost}
+        heard = ALL - {lost}
+        assert HILLY.can_grant(path, claims, (), heard.__contains__)
+        assert HILLY.granted(left, claims, heard, ()) == {"u2": 1}
+        assert HILLY.granted("u2", claims, heard, ()) == {"u2": 1}
+        said = {**claims, left: hovers(FLEET[int(left[1])], u2=1)}
+        assert not HILLY.is_granted("u2", said, ())
+        said["u2"] = claim(replace(over, grants={"u2": 1}))
+        assert HILLY.is_granted("u2", said, ())
+    assert not HILLY.can_grant(path, claims, (), {"u2"}.__contains__)
+
+
+def test_over_hills_what_was_granted_in_one_stack_is_not_granted_in_another() -> None:
+    """Both climb over the same place, one from the lowest stack and one from the highest."""
+    claims = {
+        "u1": claim(asks(1, (100.0, 0.0, 30.0), (150.0, 0.0, 70.0)), decided_s=1.0),
+        "u2": claim(asks(1, (200.0, 0.0, 110.0), (150.0, 0.0, 70.0)), decided_s=2.0),
+    }
+    for keeper in ("u0", "u1", "u2"):
+        assert "u2" not in HILLY.granted(keeper, claims, ALL, ())
+    assert HILLY.granted("u0", claims, ALL, ()) == {"u1": 1}
+    assert HILLY.granted("u1", claims, ALL, ()) == {"u1": 1}
 
 
 def test_a_way_over_somebody_who_hovers_waits_until_that_one_has_left() -> None:
@@ -185,11 +217,15 @@ def test_who_stands_on_the_ground_takes_no_air_until_its_way_up_is_granted() -> 
 class Sky:
     """A fleet whose words arrive late or never, each with its own view of the others."""
 
-    def __init__(self, rng: np.random.Generator) -> None:
-        n_uav, n_slab = int(rng.integers(2, 7)), int(rng.integers(1, 5))
-        self.slabs = Slabs.between(10.0, tuple(30.0 + 12.0 * k for k in range(n_slab)))
+    def __init__(self, rng: np.random.Generator, relief_m: float | None) -> None:
+        n_uav, n_layer = int(rng.integers(2, 7)), int(rng.integers(1, 5))
+        layers_m = tuple(30.0 + 12.0 * k for k in range(n_layer))
+        self.slabs, self.relief_m = Slabs.between(10.0, layers_m), relief_m
+        if relief_m is not None:
+            self.slabs = Slabs.over(10.0, layers_m, (0.0, relief_m))
         fleet = [
-            Starter(f"u{k}", (40.0 * k, 0.0, self.slabs.layers_m[k % n_slab])) for k in range(n_uav)
+            Starter(f"u{k}", (40.0 * k, 0.0, self.slabs.layers_m[k % n_layer]))
+            for k in range(n_uav)
         ]
         self.air, self.names = SharedAir(self.slabs, fleet), [each.uav for each in fleet]
         self.truth = {each.uav: hovers(each) for each in fleet}
@@ -251,11 +287,16 @@ class Sky:
         rng, (east_m, north_m, _) = self.rng, way.path_enu_m[-1]
         corners = [way.path_enu_m[-1]]
         if rng.random() < 0.5:
-            corners.append((east_m, north_m, float(rng.choice(self.slabs.layers_m))))
+            corners.append((east_m, north_m, self.some_height_m()))
         there = rng.uniform(0.0, 120.0, 2).tolist()
-        corners.append((*there, float(rng.choice(self.slabs.layers_m))))
+        corners.append((*there, self.some_height_m()))
         asked = replace(way, number=way.number + 1, path_enu_m=tuple(corners), flies=False)
         self.say(name, asked)
+
+    def some_height_m(self) -> float:
+        """Of a layer, over hills above ground of any height."""
+        layer_m = float(self.rng.choice(self.slabs.layers_m))
+        return layer_m + (0.0 if self.relief_m is None else self.rng.uniform(0.0, self.relief_m))
 
     def check(self) -> None:
         flown = []
@@ -269,10 +310,12 @@ class Sky:
 
 
 @settings(max_examples=40)
-@given(seed=st.integers(0, 2**32 - 1))
-def test_ways_that_are_flown_never_meet_whatever_each_keeper_has_heard(seed: int) -> None:
+@given(seed=st.integers(0, 2**32 - 1), relief_m=st.none() | st.floats(0.0, 80.0))
+def test_ways_that_are_flown_never_meet_whatever_each_keeper_has_heard(
+    seed: int, relief_m: float | None
+) -> None:
     """Nobody flies but by grants: some go home, some crash, and seats change hands."""
-    sky = Sky(np.random.default_rng(seed))
+    sky = Sky(np.random.default_rng(seed), relief_m)
     for _ in range(120):
         sky.act()
         sky.check()

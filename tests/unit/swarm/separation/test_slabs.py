@@ -195,6 +195,24 @@ def test_a_start_too_crowded_for_the_layers_is_refused() -> None:
     assert start_layers(SLABS, starts, (0, 0, 0, 0)) is None
 
 
+@given(layers=st.integers(1, 12), low_m=st.floats(-100.0, 500.0), relief_m=st.floats(0.0, 3000.0))
+def test_slabs_over_hills_form_as_many_stacks_of_neighbours_as_layers(
+    layers: int, low_m: float, relief_m: float
+) -> None:
+    heights_m = tuple(30.0 + 12.0 * k for k in range(layers))
+    slabs = Slabs.over(10.0, heights_m, (low_m, low_m + relief_m))
+    in_order = [slab for stack in slabs.stacks for slab in sorted(stack)]
+
+    assert in_order == list(range(len(slabs)))
+    assert len(slabs.stacks) == min(layers, len(slabs))
+    sizes = [len(stack) for stack in slabs.stacks]
+    assert max(sizes) - min(sizes) <= 1
+
+
+def test_each_level_layer_is_a_stack_of_its_own() -> None:
+    assert SLABS.stacks == (frozenset({0}), frozenset({1}), frozenset({2}))
+
+
 @pytest.mark.parametrize(
     ("slabs", "uavs", "rows"),
     [(3, 5, (0, 1, 2)), (7, 2, (0, 0, 0, 0, 1, 1, 1)), (3, 1, (0, 0, 0))],
@@ -217,6 +235,12 @@ def test_three_keep_a_slab_where_not_everybody_can_have_one(
 ) -> None:
     assert keeper_seats(slabs, uavs) == seats
     assert all(len(set(each)) == len(each) for each in keeper_seats(slabs, uavs))
+
+
+def test_over_hills_three_keep_each_stack_as_soon_as_there_are_three() -> None:
+    assert keeper_seats(3, 3, level=False) == ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+    assert keeper_seats(7, 3, level=False)[-1] == (2, 0, 1)
+    assert keeper_seats(3, 2, level=False) == ((0,), (0,), (1,))
 
 
 def test_the_nearest_of_two_paths_in_space_is_found_to_half_a_step() -> None:
