@@ -58,3 +58,16 @@ def test_without_a_separation_some_would_meet() -> None:
         for seed in range(3)
     ]
     assert min(each for each in nearest_m if each is not None) < 6.0
+
+
+@pytest.mark.parametrize("seed", [8, 9])
+def test_the_air_of_a_lost_keeper_is_still_shared(seed: int) -> None:
+    """Each of four has a seat in two of the three stacks at least; one crashes half-way."""
+    mission = hilly_mission(seed)
+    flown = simulate_mission(
+        mission, method="greedy", seed=seed, uncertainty=Uncertainty(loss=0.25), planner=quick_plan
+    )
+
+    assert_kept(mission, flown)
+    assert len(flown.lost_because) == 1
+    assert sorted(flown.result.done) == sorted(task.id for task in mission.tasks)
