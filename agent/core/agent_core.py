@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from agent.core.announcer import Announcer
@@ -227,7 +228,8 @@ class AgentCore(AgentPart):
 
     def memory(self, now_s: float) -> Snapshot:
         """Everything it knows, for a later life of this agent."""
-        return self._snapshot_of(self.replica.messages(), now_s)
+        known = self._snapshot_of(self.replica.messages(), now_s)
+        return replace(known, begun=self._commander.begun)
 
     def _snapshot_of(self, messages: Iterable[Message], now_s: float) -> Snapshot:
         mission_s = self._mission_view.clock.mission_s(now_s)
@@ -371,7 +373,7 @@ class AgentCore(AgentPart):
             self._sync.remember(memory, now_s)
             self._log("remembers", confirmed=brief is not None)
         claim = self.replica.claims.get(self.uav)
-        self._commander.recall(claim, rejoin=self._rejoin)
+        self._commander.recall(claim, rejoin=self._rejoin, begun=self._recovered.begun)
         if self._recovered.unconfirmed:
             self._commander.go_home("nobody knows of a mission", now_s, status=1)
         elif claim is not None and claim.phase is ClaimPhase.OUT and not self._rejoin:
@@ -477,7 +479,7 @@ class AgentCore(AgentPart):
         self._actions.clear()
         self._told_zones.tell(actions)
         remembers = self.state not in (AgentState.SYNCING, AgentState.YIELDED)
-        if remembers and self._saving.worth_keeping(actions, now_s):
+        if remembers and self._saving.worth_keeping(actions, now_s, begun=self._commander.begun):
             actions.insert(0, Save())
         # The vehicle first: it waits, while keeping and telling take their time.
         if len(actions) > 1:

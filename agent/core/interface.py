@@ -32,6 +32,9 @@ class Prepare:
     high above its home as the place lies above the ground."""
     acceleration_m_s2: float | None = None
     """To and from cruise speed, as the mission is planned; None: it does not say."""
+    begun: bool = False
+    """An earlier life of this agent had started its motors for this, and never had it ready: if
+    they run, nobody else has taken it since and it is ours, on the ground or on its way up."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -156,6 +159,13 @@ VehicleWord = Ready | KeepOut
 """What a vehicle is told that moves nothing."""
 
 VehicleOrder = Prepare | GoTo | Swap | Hold | Return | GiveWay | VehicleWord
+
+
+@dataclass(frozen=True, slots=True)
+class MotorsRun:
+    """While it is being prepared: whether its motors run, or may run, because of us."""
+
+    ours: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -301,6 +311,7 @@ class Home:
 
 VehicleReport = (
     VehicleReady
+    | MotorsRun
     | NotReady
     | Caution
     | FlightLimits

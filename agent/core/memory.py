@@ -32,6 +32,8 @@ class RecoveredState:
         """Whether it was taken because nobody came who knows better."""
         self.taken: Replica | None = None
         """What the earlier life knew, once it counts."""
+        self.begun = False
+        """Whether it had begun to take off, once that counts."""
         self._memory = memory
         self._known = Replica()
         self._known.join_all(() if memory is None else memory.messages)
@@ -78,6 +80,7 @@ class RecoveredState:
     def _take(self, counts: bool) -> Snapshot | None:
         memory, self._memory = self._memory, None
         self.taken = self._known if counts else None
+        self.begun = counts and memory is not None and memory.begun
         return memory if counts else None
 
 
@@ -97,16 +100,17 @@ class SaveCondition:
         """Of the replica's task versions, the one that is kept."""
         self._kept_at_s = -math.inf
 
-    def worth_keeping(self, actions: Iterable[Action], now_s: float) -> bool:
+    def worth_keeping(self, actions: Iterable[Action], now_s: float, *, begun: bool) -> bool:
         """Whether this agent, coordinator or operator has said something new; told once.
 
+        Or whether its vehicle has begun to take off, or has ended that.
         What others have done follows with its next announcement, and so does all when what is
         kept is about to grow old: each time is a write to a memory that wears out.
         """
         replica = self._replica
         plan = None if replica.epoch is None else (replica.epoch.number, replica.epoch.phase)
         commands, own = tuple(replica.commands.values()), replica.heads.get(self._uav)
-        before, self._kept = self._kept, (plan, replica.board_version, commands, own)
+        before, self._kept = self._kept, (plan, replica.board_version, commands, own, begun)
         worth = before != self._kept
         if not worth and any(_is_register(action) for action in actions):
             old = now_s - self._kept_at_s >= self._keep_again_s

@@ -21,6 +21,7 @@ from agent.core.interface import (
     Hold,
     Home,
     Landed,
+    MotorsRun,
     NotReady,
     Prepare,
     Refused,
@@ -70,6 +71,9 @@ class VehicleCommander(AgentPart):
         """Whether it may be in the air though this life has not brought it there."""
         self._left_in_air = False
         """Whether an earlier life was last heard to have it in the air."""
+        self.begun = False
+        """Whether its motors run for a take-off of ours that has not ended, in this life or an
+        earlier one: all that tells its vehicle from one that its pilot starts meanwhile."""
         self._flown = False
         """Whether it has been in the air in this life."""
         self._reason = ""
@@ -81,7 +85,10 @@ class VehicleCommander(AgentPart):
         """The vehicle says so; what comes late means nothing."""
         match report:
             case VehicleReady():
+                self.begun = False
                 self._take_targets(now_s)
+            case MotorsRun(ours):
+                self.begun = ours and self._machine.state is AgentState.PREPARING
             case NotReady(reason):
                 if self._machine.state not in PAUSED_BY_OPERATOR:  # why it holds is worth more
                     self._announcer.explain(reason)
@@ -163,8 +170,12 @@ class VehicleCommander(AgentPart):
 
     # -- on its way up ----------------------------------------------------------------
 
-    def recall(self, claim: Claim | None, *, rejoin: bool) -> None:
-        """What the last claim of an earlier life, if there was one, tells of the vehicle."""
+    def recall(self, claim: Claim | None, *, rejoin: bool, begun: bool) -> None:
+        """What the last claim of an earlier life, if there was one, tells of the vehicle.
+
+        Or its memory, of one that had ``begun`` to take off and claimed nothing yet.
+        """
+        self.begun = begun and not rejoin
         self._flew_before = claim is not None
         self._left_in_air = claim is not None and claim.phase in _ALOFT and not rejoin
         if claim is not None:
@@ -190,6 +201,7 @@ class VehicleCommander(AgentPart):
             ground_up_m=me.position_enu_m[2],
             left_in_air=self._left_in_air,
             acceleration_m_s2=me.acceleration_m_s2,
+            begun=self.begun,
         )
         self._order(order)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from agent.core.interface import Caution, NotReady, VehicleReport
+from agent.core.interface import Caution, MotorsRun, NotReady, VehicleReport
 from agent.vehicle.codec import MavlinkCodec
 from agent.vehicle.commands import CommandQueue, RepeatedCommand, VehicleCommand
 from agent.vehicle.config import BridgeConfig
@@ -39,6 +39,8 @@ class Conversation:
         self._actions: list[BridgeAction] = []
         self._told_not_ready: str | None = None
         self._told_caution = ""
+        self.told_motors = False
+        """Whether they were last said to run for us; at first, what an earlier life said."""
         self._cautions: dict[str, str] = {}
 
     def send(self, tag: str, command: VehicleCommand) -> None:
@@ -80,6 +82,12 @@ class Conversation:
         if told != self._told_caution:
             self._told_caution = told
             self.report(Caution(told))
+
+    def tell_motors(self, *, ours: bool) -> None:
+        """Say whether its motors run for us, when that changes."""
+        if ours != self.told_motors:
+            self.told_motors = ours
+            self.report(MotorsRun(ours))
 
     def tell_anew(self) -> None:
         """Another wait begins: what was told may be told again."""

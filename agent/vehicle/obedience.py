@@ -125,6 +125,7 @@ def begin_preparing(activity: Activity, order: Prepare, session: VehicleSession)
     session.awaits_turn = False
     session.cruise_speed_m_s = order.speed_m_s
     session.planned_m_s2 = order.acceleration_m_s2
+    session.told_motors = order.begun
     session.sent_to_enu_m.append(order.position_enu_m)
     session.tell_anew()
     return Preparing(session, order, ours=ours)

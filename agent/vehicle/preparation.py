@@ -99,7 +99,7 @@ class _Preparation:
         self._uploads = 0
         self._upload_at_s = -math.inf
         self._mission_begun = False
-        self._consent = PilotConsent(firmware, ours=ours or order.resume)
+        self._consent = PilotConsent(firmware, ours=ours or order.resume, begun=order.begun)
         self._leg: RepositionLeg | None = None
         self._barred: bool | None = None
         self._speed = CruiseSpeedSetting(order.speed_m_s, firmware, session)
@@ -192,6 +192,7 @@ class _Preparation:
             self._go_on_in_the_air(vehicle.position)
         else:
             self._session.say(*self._take_off(vehicle.position))
+        self._session.tell_motors(ours=self.engaged or self._consent.covers(heartbeat))
         if not self.done and self.failure is None:
             self._limits.ask(armed=heartbeat.armed)
 
@@ -328,9 +329,8 @@ class _Preparation:
         if self._leg is None and not self._resumes and not self._aims_at(position):
             self.waiting_for = _NO_PLACE
             return
-        order = self._order
         if self._leg is None and not self._resumes and not self._is_barred:
-            place = (order.position_enu_m, order.speed_m_s)
+            place = (self._order.position_enu_m, self._order.speed_m_s)
             self._leg = RepositionLeg(self._session, self._firmware, *place)
             self._leg.start()
         leg = self._leg

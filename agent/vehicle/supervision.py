@@ -64,11 +64,13 @@ class PilotConsent:
 
     Args:
         ours: the vehicle flies, or may fly, on our orders already.
+        begun: an earlier life has started its motors; no more once they stand, or it is flown
+            in a mode that is none of ours.
     """
 
-    def __init__(self, firmware: Firmware, *, ours: bool) -> None:
+    def __init__(self, firmware: Firmware, *, ours: bool, begun: bool = False) -> None:
         self._firmware = firmware
-        self._ours = ours
+        self._ours, self._begun = ours, begun
         self._given = False
         self._mode_before: int | None = None
         """In which it was armed when last seen; None if it was not armed."""
@@ -76,7 +78,11 @@ class PilotConsent:
     @property
     def needed(self) -> bool:
         """Whether the vehicle, if it is armed, is somebody else's."""
-        return not self._ours
+        return not (self._ours or self._begun)
+
+    def covers(self, heartbeat: Heartbeat) -> bool:
+        """Whether its motors run for us."""
+        return heartbeat.armed and not self.needed
 
     def arm(self) -> None:
         """We are about to start its motors."""
@@ -86,23 +92,31 @@ class PilotConsent:
         """See whether somebody gives the vehicle to us."""
         firmware, mode, before = self._firmware, heartbeat.custom_mode, self._mode_before
         self._mode_before = mode if heartbeat.armed else None
+        self._begun &= heartbeat.armed and (
+            firmware.is_commanded(mode) or _by_itself(firmware, mode)
+        )
         if not (heartbeat.armed and firmware.is_commanded(mode)):
             self._given = False
         elif firmware.commanded_by_choice:
             self._given = True
         elif before is not None and before != mode:
             # Takeoffs and missions end in that mode by themselves, and so do failsafes.
-            by_itself = firmware.is_taking_off(before) or firmware.is_mission(before)
+            by_itself = _by_itself(firmware, before)
             self._given = not by_itself and not firmware.alarmed(heartbeat)
 
     def objection(self, *, airborne: bool) -> str | None:
         """Why the armed vehicle is to be left alone, in words; None if it may be commanded."""
-        if self._ours or (airborne and self._given):
+        if not self.needed or (airborne and self._given):
             return None
         if not airborne:
             return "armed by somebody else: disarm it"
         mode = self._firmware.commanded_mode_name
         return f"flown by its pilot: land it, or switch it to {mode} from another mode"
+
+
+def _by_itself(firmware: Firmware, mode: int) -> bool:
+    """Whether that mode ends in the one that takes our targets without anybody's doing."""
+    return firmware.is_taking_off(mode) or firmware.is_mission(mode)
 
 
 _BATTERY_READINGS = 5

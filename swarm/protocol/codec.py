@@ -328,7 +328,8 @@ class Codec:
         known = isinstance(mission_s, float) and abs(mission_s) <= LATEST_S
         _require(known or mission_s is None, "malformed")
         _require(isinstance(registers, tuple), "malformed")
-        return Snapshot(mission, writer, incarnation, mission_s, ()), registers
+        begun = len(parts) > 6 and parts[6] is True
+        return Snapshot(mission, writer, incarnation, mission_s, (), begun), registers
 
     def _message(self, parts: object) -> Message:
         if not isinstance(parts, tuple) or len(parts) < 7:

@@ -255,7 +255,8 @@ def snapshot_bytes(snapshot: Snapshot, registers: Sequence[bytes]) -> bytes:
         snapshot.mission_s,
     )
     packed: list[bytes] = [msgpack.packb(part) for part in head]
-    return _array([*packed, _array(registers)])
+    begun = [msgpack.packb(snapshot.begun)] if snapshot.begun else []
+    return _array([*packed, _array(registers), *begun])
 
 
 def _array(parts: Sequence[bytes]) -> bytes:

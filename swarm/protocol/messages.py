@@ -356,6 +356,8 @@ class Snapshot:
     """Of the process that answers."""
     mission_s: Instant | None
     messages: tuple[Message, ...]
+    begun: bool = False
+    """In an agent's own memory alone: its vehicle is on its way up, on its order."""
 
 
 def as_heard(message: Message, said: bytes, envelope: bytes | None = None) -> Message:

@@ -10,6 +10,7 @@ from agent.core.interface import (
     Caution,
     GoTo,
     Held,
+    MotorsRun,
     NotReady,
     Prepare,
     ReturnBegun,
@@ -80,9 +81,11 @@ class BridgeFlight:
             self.copter.power_on(100.0)
         self.now_s = self.copter.now_s
         self.reports: list[VehicleReport] = []
-        """All but telemetry, cautions and what was seen, in order."""
+        """All but telemetry, cautions, motors and what was seen, in order."""
         self.seen: list[VehicleReport] = []
         """What was seen of the effect of orders, in order."""
+        self.motors: list[bool] = []
+        """Whether its motors were said to run on our order, in order."""
         self.cautions: list[str] = []
         """What people are told of the vehicle, in order."""
         self._read = 0
@@ -102,7 +105,8 @@ class BridgeFlight:
         self.telemetry += [r for r in reports if isinstance(r, Telemetry)]
         self.cautions += [r.reason for r in reports if isinstance(r, Caution)]
         self.seen += [r for r in reports if isinstance(r, Held | ReturnBegun)]
-        aside = Telemetry | Caution | Held | ReturnBegun
+        self.motors += [r.ours for r in reports if isinstance(r, MotorsRun)]
+        aside = Telemetry | Caution | Held | ReturnBegun | MotorsRun
         self.reports += [r for r in reports if not isinstance(r, aside)]
         self._carry(answers)
         return reports

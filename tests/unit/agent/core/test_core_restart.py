@@ -11,6 +11,7 @@ from agent.core.interface import (
     GoTo,
     HandedOver,
     Home,
+    MotorsRun,
     Prepare,
     Refused,
     Return,
@@ -22,6 +23,7 @@ from swarm.protocol.events import (
     KeysReplaced,
     MessageReceived,
     Publish,
+    Save,
     SnapshotsReceived,
     Stop,
 )
@@ -511,3 +513,37 @@ def test_told_to_stop_before_it_has_learned_it_brings_the_vehicle_home(age_s: fl
     agent = crashed().reborn(remembers=True, down_s=age_s)
 
     assert orders(agent.happen(Stop("told"))) == [Return("told", resume=True)]
+
+
+# -- killed while it takes off ----------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ours", [True, False])
+def test_one_that_had_begun_to_take_off_knows_its_vehicle_again(ours: bool) -> None:
+    earlier = LoneAgent(uav("u0"))
+    earlier.learn(earlier.statement(COORDINATOR, earlier.brief))
+    earlier.happen(MotorsRun(True))
+    earlier.happen(MotorsRun(ours))
+    agent = earlier.reborn(remembers=True)
+
+    assert orders(agent.learn_what_was_known_to(earlier)) == [replace(PREPARE, begun=ours)]
+
+
+def test_that_motors_run_is_kept_at_once_and_no_longer_than_until_it_is_ready() -> None:
+    agent = LoneAgent(uav("u0"))
+    agent.learn(agent.statement(COORDINATOR, agent.brief))
+
+    assert Save() in agent.happen(MotorsRun(True))
+    assert agent.core.memory(agent.now_s).begun
+    assert Save() in agent.happen(VehicleReady())
+    assert not agent.core.memory(agent.now_s).begun
+
+
+def test_a_take_off_of_another_flight_means_nothing() -> None:
+    earlier = LoneAgent(uav("u0"))
+    earlier.learn(earlier.statement(COORDINATOR, earlier.brief))
+    earlier.happen(MotorsRun(True))
+    agent = earlier.reborn(remembers=True)
+    another = replace(agent.brief, run=agent.brief.run + 1)
+
+    assert orders(agent.learn(*agent.coordinators(another, NEAR))) == [PREPARE]

@@ -49,11 +49,11 @@ def test_every_message_comes_back_as_it_was_said(said: Message) -> None:
     assert codec.dropped.total() == 0
 
 
-@given(st.lists(messages(), max_size=5).map(tuple), st.none() | st.floats(-1e9, 1e9))
+@given(st.lists(messages(), max_size=5).map(tuple), st.none() | st.floats(-1e9, 1e9), st.booleans())
 def test_every_snapshot_comes_back_as_it_was_said(
-    said: tuple[Message, ...], mission_s: float | None
+    said: tuple[Message, ...], mission_s: float | None, begun: bool
 ) -> None:
-    codec, snapshot = Codec(MISSION), Snapshot(MISSION, "u0", 1, mission_s, said)
+    codec, snapshot = Codec(MISSION), Snapshot(MISSION, "u0", 1, mission_s, said, begun)
 
     assert codec.decode_snapshot(KeySpace(MISSION).state("u0"), encode(snapshot)) == snapshot
     assert codec.dropped.total() == 0
