@@ -18,6 +18,8 @@ from tests.process.programs import run_swarm
 pytestmark = [pytest.mark.process]
 
 SPEEDUP = 6.0
+FLIGHTS = [("ardupilot", False), pytest.param("px4", True, marks=pytest.mark.slow)]
+"""Firmware, and whether it starts again without anybody's word."""
 WHY_NOT = ("stays on the ground: battery at", "does not stand at a base", "has not confirmed it")
 """Before its battery is full, or once it flies already; and on a machine that is slow."""
 
@@ -54,7 +56,7 @@ def let_start(hand: ByHand, name: str) -> list[tuple[int, str]]:
     return came
 
 
-@pytest.mark.parametrize(("flavour", "by_itself"), [("ardupilot", False), ("px4", True)])
+@pytest.mark.parametrize(("flavour", "by_itself"), FLIGHTS)
 def test_killed_while_it_lands_swaps_and_climbs_it_goes_on_each_time(
     tmp_path: Path, flavour: str, by_itself: bool
 ) -> None:

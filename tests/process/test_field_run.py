@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -14,7 +12,7 @@ import pytest
 from swarm.model import Base, BaseId, Mission, Origin, Task, TaskId, Uav, UavId, Zone, ZoneId
 from tests.process.mission import SwarmRun
 from tests.process.pace import pace
-from tests.process.test_secure_run import swarm, written
+from tests.process.test_secure_run import written
 
 pytestmark = [pytest.mark.process]
 
@@ -65,7 +63,13 @@ def swaps(told: dict[str, Any], key: str) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize("more", [["--command", "reposition"], ["--autopilot", "sim-px4"]])
+@pytest.mark.parametrize(
+    "more",
+    [
+        ["--autopilot", "sim-px4"],
+        pytest.param(["--command", "reposition"], marks=pytest.mark.slow),
+    ],
+)
 def test_every_task_is_done_round_zones_with_batteries_changed_on_the_way(
     tmp_path: Path, more: list[str]
 ) -> None:
@@ -92,22 +96,3 @@ def test_every_task_is_done_round_zones_with_batteries_changed_on_the_way(
             if entry["go"] in told["done"]
         ),
     )
-
-
-def test_a_zone_drawn_in_flight_is_known_to_all_and_shown(tmp_path: Path) -> None:
-    mission, folder = replace(pasture(), zones=()), tmp_path / "run"
-    folder.mkdir()
-    words = [written(mission, tmp_path), "--speedup", f"{pace(8.0):g}"]
-    with SwarmRun(words, folder) as run:
-        run.wait_for_line("epoch 1")
-        corners = [f"{east_m:g},{north_m:g}" for east_m, north_m in POND]
-        drawn = swarm("zone", "add", "pond", "--polygon", *corners, "--json")
-        shown = swarm("status", "--json")
-        status, told = run.result()
-        run.assert_nothing_left()
-
-    assert drawn.returncode == 0, drawn.stderr
-    assert json.loads(drawn.stdout)["obeyed"]
-    assert json.loads(shown.stdout)["zones"] == ["pond"]
-    assert status == 0, run.story()
-    assert sorted(told["done"]) == [task.id for task in mission.tasks]

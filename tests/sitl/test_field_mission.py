@@ -20,24 +20,14 @@ from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
 from tests.process.mission import SwarmRun
 from tests.process.pace import pace
-from tests.sitl.whole_run import autopilot_of
+from tests.sitl.whole_run import autopilot_of, by_day
 
 pytestmark = [pytest.mark.sitl, pytest.mark.process]
 
 VINEYARD = resolve_scenario("vineyard")
 SPEEDUP = 6.0
 """More, and a UAV is told of by so few places that it cannot be judged by them."""
-FLIGHTS = [
-    (FirmwareKind.ARDUPILOT, CommandStyle.REPOSITION),
-    (FirmwareKind.PX4, CommandStyle.MISSION),
-    *(
-        pytest.param(*flight, marks=pytest.mark.slow)
-        for flight in (
-            (FirmwareKind.ARDUPILOT, CommandStyle.MISSION),
-            (FirmwareKind.PX4, CommandStyle.REPOSITION),
-        )
-    ),
-]
+FLIGHTS = by_day(FirmwareKind.ARDUPILOT, CommandStyle.REPOSITION)
 
 
 @pytest.mark.parametrize(("kind", "style"), FLIGHTS)

@@ -22,7 +22,7 @@ from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.mission import SwarmRun, wait_until
 from tests.process.pace import pace
 from tests.process.test_secure_run import swarm, written
-from tests.sitl.whole_run import autopilot_of
+from tests.sitl.whole_run import autopilot_of, by_day
 
 pytestmark = [pytest.mark.sitl, pytest.mark.process]
 
@@ -33,17 +33,7 @@ PLACES = {"far": (220.0, 0.0), "lake": (97.0, 5.0), "west": (-180.0, 20.0), "nor
 LATER_S = {"lake": 90.0, "north": 120.0}
 OVER_M = 20.0
 """Half the side of the zone that is drawn over a UAV."""
-FLIGHTS = [
-    (FirmwareKind.ARDUPILOT, CommandStyle.REPOSITION),
-    (FirmwareKind.PX4, CommandStyle.MISSION),
-    *(
-        pytest.param(*flight, marks=pytest.mark.slow)
-        for flight in (
-            (FirmwareKind.ARDUPILOT, CommandStyle.MISSION),
-            (FirmwareKind.PX4, CommandStyle.REPOSITION),
-        )
-    ),
-]
+FLIGHTS = by_day(FirmwareKind.PX4, CommandStyle.MISSION)
 
 
 def meadow_with_a_lake() -> Mission:
@@ -120,6 +110,7 @@ def test_zones_are_heeded_while_they_are_there_and_flown_through_afterwards(
         run.wait_for_line("epoch 1", timeout_s=150.0)
         flying_to(run, "far")
         assert obeyed("add", "lake", "--polygon", *(f"{x:g},{y:g}" for x, y in LAKE))
+        assert status()["zones"] == ["lake"]
         east_m, north_m, _ = flying_to(run, "west")["position_enu_m"]
         over = [
             f"{east_m + east * OVER_M:g},{north_m + north * OVER_M:g}"

@@ -8,9 +8,13 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 from typing import Any
 
+import pytest
+
+from agent.vehicle.config import CommandStyle
 from sim.fleet.firmware import FirmwareKind
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
@@ -65,6 +69,14 @@ class Autopilot:
     speedup: float
     worth: float
     """Least J in J of the plan: real vehicles take time to get up to speed, and to stop."""
+
+
+def by_day(kind: FirmwareKind, style: CommandStyle) -> list[object]:
+    """All pairs of firmware and way to command, of which only that one is flown by day."""
+    return [
+        pytest.param(*pair, marks=() if pair == (kind, style) else pytest.mark.slow)
+        for pair in product(FirmwareKind, CommandStyle)
+    ]
 
 
 def autopilot_of(kind: FirmwareKind) -> Autopilot:
