@@ -52,6 +52,7 @@ def test_parted_halves_of_a_mesh_agree_after_healing_and_lose_nothing(tmp_path: 
     assert verdict.agreement_s <= AGREE_WITHIN_S
 
 
+@pytest.mark.slow
 def test_halves_at_two_routers_agree_after_healing_and_lose_nothing(tmp_path: Path) -> None:
     async def script(flight: ChaosFlight) -> None:
         await flight.until_done(5)

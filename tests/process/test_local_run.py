@@ -31,11 +31,11 @@ def told(*words: str) -> dict[str, Any]:
     return found
 
 
-@pytest.mark.parametrize("more", [["--bus", "mesh"], ["--bus", "mesh", "--secure"]])
-def test_an_operator_commands_the_run_of_this_machine(tmp_path: Path, more: list[str]) -> None:
+@pytest.mark.parametrize("keys", [["--secure"], pytest.param([], marks=pytest.mark.slow)])
+def test_an_operator_commands_the_run_of_this_machine(tmp_path: Path, keys: list[str]) -> None:
     mission, folder = long_mission(LONG), tmp_path / "run"
     folder.mkdir()
-    with SwarmRun([written(mission, tmp_path), *FAST, *more], folder) as run:
+    with SwarmRun([written(mission, tmp_path), *FAST, "--bus", "mesh", *keys], folder) as run:
         run.wait_for_line("epoch 1")
         assert [each.mission for each in local_runs()] == [mission.name]
 

@@ -26,7 +26,10 @@ pytestmark = [pytest.mark.sitl, pytest.mark.process]
 
 @pytest.mark.parametrize(
     ("flavour", "acceleration_m_s2", "style"),
-    [("ardupilot", 1.0, CommandStyle.MISSION), ("px4", 2.0, CommandStyle.REPOSITION)],
+    [
+        ("ardupilot", 1.0, CommandStyle.MISSION),
+        pytest.param("px4", 2.0, CommandStyle.REPOSITION, marks=pytest.mark.slow),
+    ],
 )
 def test_legs_take_as_long_as_planned_by_the_vehicles_own_acceleration(
     tmp_path: Path, flavour: str, acceleration_m_s2: float, style: CommandStyle

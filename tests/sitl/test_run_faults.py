@@ -26,10 +26,12 @@ REASONS = {
 @pytest.mark.parametrize(
     ("vehicles", "faults"),
     [
-        ("sim", ["uav2:pilot@20", "uav3:reboot@20"]),
+        pytest.param("sim", ["uav2:pilot@20", "uav3:reboot@20"], marks=pytest.mark.slow),
         # Only a PX4 that is commanded by missions cannot be pulled back by an order under way.
         ("sim-px4 --command uav3=mission", ["uav2:silent@20+100", "uav3:pilot@20"]),
-        ("sim", ["uav2:battery-low@18", "uav3:failsafe-rtl@20"]),
+        pytest.param(
+            "sim", ["uav2:battery-low@18", "uav3:failsafe-rtl@20"], marks=pytest.mark.slow
+        ),
     ],
     ids=["pilot-and-reboot", "silent-and-pilot", "battery-and-failsafe"],
 )
