@@ -46,6 +46,8 @@ _HGT_VOID = -32768
 _TILE = re.compile(r"([NS])(\d\d)([EW])(\d\d\d)", re.IGNORECASE)
 _SUFFIXES = (".tif", ".tiff", ".hgt", ".hgt.gz", ".hgt.zip")
 _LATTICE = 9
+_BULGE_FRAC = 0.01
+"""By how much of its size, and more, the edge of a grid may be curved between its places."""
 _FRAME_M = 100.0
 """What is kept around the places of a mission, as far as the file reaches [m]."""
 
@@ -355,15 +357,16 @@ def _terrain(
 
 def _lift_m(raster: _Raster, origin: Origin, frame: _Frame, up_m: FloatArray) -> FloatArray:
     """(rows, columns) how much higher the grid must be for no pixel to rise above it [m]."""
-    pixel_rows, pixel_columns = raster.up_m.shape
-    place = _places_of_pixels(raster, origin, frame, up_m.shape)
+    place, (first_column, last_column), (first_row, last_row) = _places_of_pixels(
+        raster, origin, frame, up_m.shape
+    )
     rows, columns = up_m.shape
     excess_m = np.zeros((rows - 1) * (columns - 1))
-    at_once = max(1, 1_000_000 // pixel_columns)
-    for top in range(0, pixel_rows, at_once):
-        part_m = raster.up_m[top : top + at_once]
+    at_once = max(1, 1_000_000 // (last_column - first_column + 1))
+    for top in range(first_row, last_row + 1, at_once):
+        part_m = raster.up_m[top : min(top + at_once, last_row + 1), first_column : last_column + 1]
         row, column = (each.ravel() for each in np.indices(part_m.shape, dtype=np.float64))
-        east_m, north_m = place(column, row + top)
+        east_m, north_m = place(column + first_column, row + top)
         u = (east_m - frame.west_m) / frame.east_step_m
         v = (north_m - frame.south_m) / frame.north_step_m
         inside = (u >= 0) & (v >= 0) & (u <= columns - 1) & (v <= rows - 1)
@@ -385,8 +388,16 @@ def _lift_m(raster: _Raster, origin: Origin, frame: _Frame, up_m: FloatArray) ->
 
 def _places_of_pixels(
     raster: _Raster, origin: Origin, frame: _Frame, shape: tuple[int, ...]
-) -> Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]]:
-    """Column and row to east and north [m], by a parabola through a lattice of places."""
+) -> tuple[
+    Callable[[FloatArray, FloatArray], tuple[FloatArray, FloatArray]],
+    tuple[int, int],
+    tuple[int, int],
+]:
+    """Column and row to east and north [m], by a parabola through a lattice of places.
+
+    Beside it the first and last column, and the first and last row, between which all pixels on
+    the grid are. A tile of one degree has a thousand times as many.
+    """
     rows, columns = shape
     east_m, north_m = (
         frame.west_m + np.linspace(0.0, (columns - 1) * frame.east_step_m, _LATTICE),
@@ -407,7 +418,15 @@ def _places_of_pixels(
         found_m = terms(column, row) @ factors
         return found_m[:, 0], found_m[:, 1]
 
-    return place
+    def span(index: FloatArray, count: int) -> tuple[int, int]:
+        spare = 2.0 + _BULGE_FRAC * np.ptp(index)
+        return (
+            max(math.floor(index.min() - spare), 0),
+            min(math.ceil(index.max() + spare), count - 1),
+        )
+
+    pixel_rows, pixel_columns = raster.up_m.shape
+    return place, span(column, pixel_columns), span(row, pixel_rows)
 
 
 def _deg(origin: Origin, east_m: FloatArray, north_m: FloatArray) -> tuple[FloatArray, FloatArray]:
