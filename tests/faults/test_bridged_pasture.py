@@ -30,7 +30,6 @@ from tests.support.bridged_pasture import (
     pasture,
 )
 from tests.support.fake_copter import ARM
-from tests.support.seeds import seeds
 
 LIMIT_S = 900.0
 FLED_S = 25
@@ -88,7 +87,7 @@ def test_a_zone_drawn_across_a_flown_path_is_flown_round(
 
 
 @OTHER_DIAGONAL
-@pytest.mark.parametrize("ahead_m", [2.0, 8.0, 14.0])
+@pytest.mark.parametrize("ahead_m", [2.0, pytest.param(8.0, marks=pytest.mark.slow), 14.0])
 def test_a_zone_drawn_nearer_than_a_uav_can_brake_is_its_fence_once_it_is_outside(
     flavour: FirmwareModelName, style: CommandStyle, ahead_m: float
 ) -> None:
@@ -118,12 +117,18 @@ def test_a_zone_drawn_nearer_than_a_uav_can_brake_is_its_fence_once_it_is_outsid
     assert_all_done(fleet)
 
 
-@pytest.mark.parametrize("said", [True, False])
 @pytest.mark.parametrize(
-    ("flavour", "style"),
+    ("flavour", "style", "said"),
     [
-        (FirmwareModelName.ARDUPILOT, CommandStyle.MISSION),
-        (FirmwareModelName.PX4, CommandStyle.REPOSITION),
+        (FirmwareModelName.ARDUPILOT, CommandStyle.MISSION, True),
+        (FirmwareModelName.PX4, CommandStyle.REPOSITION, False),
+        *(
+            pytest.param(*case, marks=pytest.mark.slow)
+            for case in (
+                (FirmwareModelName.ARDUPILOT, CommandStyle.MISSION, False),
+                (FirmwareModelName.PX4, CommandStyle.REPOSITION, True),
+            )
+        ),
     ],
 )
 def test_a_base_that_a_dead_uav_blocks_is_used_again_only_if_the_operator_says_so(
@@ -212,10 +217,15 @@ def test_a_battery_that_drains_twice_as_fast_is_changed_in_time(
 
 
 MOMENTS = ("landing", "swapping", "climbing")
+KILLS = [
+    pytest.param(seed, moment, marks=() if seed == number % 2 else pytest.mark.slow)
+    for number, moment in enumerate(MOMENTS)
+    for seed in range(40)
+]
+"""By day one at each moment, of both kinds of firmware and of ways to command."""
 
 
-@pytest.mark.parametrize("moment", MOMENTS)
-@pytest.mark.parametrize("seed", seeds(2, 40))
+@pytest.mark.parametrize(("seed", "moment"), KILLS)
 def test_an_agent_killed_at_its_base_goes_on_where_its_vehicle_is(seed: int, moment: str) -> None:
     """Killed at any moment from the order to land until it has climbed, for any while."""
     rng = np.random.default_rng([seed, MOMENTS.index(moment)])

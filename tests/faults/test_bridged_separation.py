@@ -21,7 +21,6 @@ from tests.support.bridged_crossings import (
     roughness,
 )
 from tests.support.bridged_fleet import KINDS, ONE_DIAGONAL, OTHER_DIAGONAL
-from tests.support.seeds import seeds
 
 LONGEST_S = 2_400.0
 """No flight takes longer, keepers of air that are lost until their batteries are empty included."""
@@ -80,8 +79,20 @@ def test_eight_through_one_point_all_get_through(monkeypatch: pytest.MonkeyPatch
     assert fleet.nearest_m >= SEPARATION_M, fleet.nearest
 
 
-@pytest.mark.parametrize("planned", [True, False], ids=["planned", "by giving way alone"])
-@pytest.mark.parametrize("seed", seeds(2, 100))
+ROUGH = [
+    pytest.param(
+        seed,
+        planned,
+        marks=() if seed == 1 - planned else pytest.mark.slow,
+        id=f"{seed}-{'planned' if planned else 'by giving way alone'}",
+    )
+    for seed in range(100)
+    for planned in (True, False)
+]
+"""By day one of each."""
+
+
+@pytest.mark.parametrize(("seed", "planned"), ROUGH)
 def test_random_ways_with_all_that_goes_wrong(
     seed: int, planned: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
