@@ -63,6 +63,7 @@ def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> Missi
                 acceleration_m_s2=uav.acceleration_m_s2,
                 airspeed_m_s=uav.airspeed_m_s,
                 endurance_s=uav.endurance_s,
+                vehicle=uav.vehicle,
                 **_shares_of(uav),
             )
             for uav, layer_m in zip(mission.uavs, layers_m, strict=True)

@@ -5,6 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from swarm.model.terrain import Terrain
+from swarm.model.vehicles import TRAITS, VehicleKind
+
+GROUND_M = 0.0
+"""The layer of what drives."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +31,10 @@ class FlightLayers:
     def layer_m(self, index: int) -> float:
         """Layer of the UAV with that place in the scenario [m]."""
         return self.lowest_m + index * self.spacing_m
+
+    def layer_of_m(self, vehicle: VehicleKind, index: int) -> float:
+        """Layer of a UAV of that kind at that place [m]."""
+        return GROUND_M if TRAITS[vehicle].drives else self.layer_m(index)
 
 
 HIGHEST_M = 120.0

@@ -10,9 +10,10 @@ from swarm.model.areas import Area
 from swarm.model.frames import Origin
 from swarm.model.ids import RESERVED, BaseId, TaskId, UavId, require_id
 from swarm.model.terrain import Terrain
+from swarm.model.vehicles import TRAITS, VehicleKind, turn_radius_m
 from swarm.model.zones import Zone
 
-PLAIN_CONSTRAINTS = frozenset({"acceleration_m_s2"})
+PLAIN_CONSTRAINTS = frozenset({"vehicle", "acceleration_m_s2"})
 """What `swarm.allocation.Problem` heeds; any other makes a mission one of the field."""
 
 PointEnu = tuple[float, float, float]
@@ -50,6 +51,9 @@ class Uav:
     layer_m: float | None = None
     """Height of its layer above the places it visits [m]; None: by its place in the mission. No
     file names one: a fleet that is briefed already has it from its coordinator."""
+    vehicle: VehicleKind = VehicleKind.COPTER
+    """What flies, or drives. Of one that cannot stay the acceleration tells its turns
+    (swarm.model.vehicles)."""
 
     def __post_init__(self) -> None:
         require_id(self.id, "UAV id")
@@ -68,8 +72,17 @@ class Uav:
             if not 0.0 <= getattr(self, name) <= 1.0:
                 share = getattr(self, name)
                 raise ValueError(f"{name} of UAV {self.id} must be within 0..1, not {share}")
+        if not TRAITS[self.vehicle].stays and self.acceleration_m_s2 is None:
+            raise ValueError(f"how UAV {self.id} turns must be given, as it is a {self.vehicle}")
         require_probabilities(self.success, f"success of UAV {self.id}")
         require_probabilities(self.survival, f"survival of UAV {self.id}")
+
+    @property
+    def turn_radius_m(self) -> float | None:
+        """Of the circle on which it turns, and waits [m]; None of one that stays where it is."""
+        if TRAITS[self.vehicle].stays or self.acceleration_m_s2 is None:
+            return None
+        return turn_radius_m(self.speed_m_s, self.acceleration_m_s2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -245,6 +258,8 @@ class Mission:
         """What it has beyond the paper's mission, by the keys of a scenario file."""
         of_uavs = ("acceleration_m_s2", "airspeed_m_s", "endurance_s")
         found = [key for key in of_uavs if any(getattr(uav, key) is not None for uav in self.uavs)]
+        if any(uav.vehicle is not VehicleKind.COPTER for uav in self.uavs):
+            found.insert(0, "vehicle")
         of_tasks = {
             "due_s": lambda task: task.due_s is not None,
             "opens_s": lambda task: task.opens_s > 0.0,
@@ -288,3 +303,8 @@ def chances(table: Mapping[str, float], tasks: Iterable[Task], default: float) -
         table.get(task.id, default if task.kind is None else table.get(task.kind, default))
         for task in tasks
     ]
+
+
+def kinds_of(mission: Mission) -> tuple[VehicleKind, ...]:
+    """The kinds of its UAVs, each once, in the order of the mission."""
+    return tuple(dict.fromkeys(uav.vehicle for uav in mission.uavs))

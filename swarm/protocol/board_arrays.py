@@ -158,6 +158,7 @@ def _uav_of(entry: UavSpec) -> Uav:
         endurance_s=entry.endurance_s,
         reserve_frac=entry.reserve_frac,
         charge_frac=entry.charge_frac,
+        vehicle=entry.vehicle,
     )
 
 

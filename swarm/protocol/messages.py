@@ -18,6 +18,7 @@ from pydantic import Strict
 
 from swarm.model import Origin
 from swarm.model.ids import AUTHORITY, FLEET, RESERVED
+from swarm.model.vehicles import VehicleKind
 from swarm.protocol.field_messages import (
     AreaSpec,
     BaseSpec,
@@ -100,6 +101,8 @@ class UavSpec(Checked):
     """Share of the endurance that is never planned with."""
     charge_frac: Probability = 1.0
     """Charge of the battery at mission time 0."""
+    vehicle: VehicleKind = VehicleKind.COPTER
+    """What it is to fly, or drive."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -25,6 +25,7 @@ from swarm.model import (
 )
 from swarm.model.frames import enu_from_wgs84
 from swarm.model.rings import Ring
+from swarm.model.vehicles import turning_acceleration_m_s2
 
 if TYPE_CHECKING:
     from swarm.scenario.shapes import (
@@ -74,12 +75,19 @@ def _uav(uav: UavTable, origin: Origin | None) -> Uav:
         success=uav.success,
         survival=uav.survival,
         kind=uav.kind,
-        acceleration_m_s2=uav.acceleration_m_s2,
+        acceleration_m_s2=_acceleration_m_s2(uav),
         airspeed_m_s=uav.airspeed_m_s,
         endurance_s=uav.endurance_s,
         reserve_frac=uav.reserve_frac,
         charge_frac=uav.charge_frac,
+        vehicle=uav.vehicle,
     )
+
+
+def _acceleration_m_s2(uav: UavTable) -> float | None:
+    if uav.turn_radius_m is None:
+        return uav.acceleration_m_s2
+    return turning_acceleration_m_s2(uav.speed_m_s, uav.turn_radius_m)
 
 
 def _base(base: BaseTable, origin: Origin | None) -> Base:

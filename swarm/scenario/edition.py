@@ -14,7 +14,15 @@ EDITIONS = (1, 2)
 """Values of ``schema``."""
 NEW_KEYS: Mapping[str, Sequence[str]] = {
     "mission": ("wind_m_s", "zone_margin_m", "separation_m", "band_m"),
-    "uav": ("acceleration_m_s2", "airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac"),
+    "uav": (
+        "acceleration_m_s2",
+        "airspeed_m_s",
+        "endurance_s",
+        "reserve_frac",
+        "charge_frac",
+        "vehicle",
+        "turn_radius_m",
+    ),
     "task": ("due_s", "opens_s", "closes_s", "path_m", "path", "trigger_m", "height_m"),
 }
 """What schema 2 adds to the tables of schema 1."""

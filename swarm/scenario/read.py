@@ -96,6 +96,7 @@ def build_mission(
         InputError: with every fault of the document, then those of the tasks.
     """
     from swarm.scenario.shapes import validate
+    from swarm.scenario.vehicle_faults import table_faults, vehicle_faults
 
     first: dict[str, int] = {}
     if tasks is not None:
@@ -104,12 +105,16 @@ def build_mission(
         document = {"task": [], **document}
     scenario, findings = validate(document)
     findings += check(document)
+    if scenario is not None:
+        findings += table_faults(scenario)
     if scenario is not None and not findings:
         mission = mission_of(scenario)
         if mission.areas:
             from swarm.scenario.area_faults import with_lines
 
             mission, findings = with_lines(mission)
+        if not findings:
+            findings = list(vehicle_faults(mission, scenario))
         if not findings and mission.separation_m is not None:
             findings = _crowded_starts(mission)
         if not findings and (terrain := scenario.terrain) is not None:

@@ -15,6 +15,7 @@ from typing import Annotated
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from swarm.model.ids import ID_RULE
+from swarm.model.vehicles import VehicleKind
 from swarm.scenario.edition import EDITIONS, edition_faults
 from swarm.scenario.findings import Document, Finding, close_match
 from swarm.scenario.validation import (
@@ -170,6 +171,8 @@ class UavTable(_Placed):
     endurance_s: Annotated[float, Field(gt=0.0, le=1e9)] | None = None
     reserve_frac: _Share = 0.2
     charge_frac: _Share = 1.0
+    vehicle: Annotated[VehicleKind, Field(strict=False)] = VehicleKind.COPTER
+    turn_radius_m: _Distance | None = None
 
 
 class BaseTable(_Placed):
@@ -324,6 +327,8 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("uav", "acceleration_m_s2"): "a number > 0 and <= 1e6 [m/s²], such as 2.5",
     ("uav", "airspeed_m_s"): "a speed through the air > 0 and <= 1e6 [m/s], such as 12.0",
     ("uav", "endurance_s"): "a number > 0 and <= 1e9 [s], such as endurance_s = 1200.0",
+    ("uav", "vehicle"): f"one of {', '.join(map(repr, map(str, VehicleKind)))}",
+    ("uav", "turn_radius_m"): "the radius of its circles within 0.1..1e6 [m], such as 60.0",
     ("uav", "reserve_frac"): _SHARE,
     ("uav", "charge_frac"): _SHARE,
     ("base",): "one table [[base]] per base",

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
 
 from swarm.model import Area, Base, Camera, Mission, Task, Uav, Zone
+from swarm.model.vehicles import VehicleKind
 from swarm.scenario.ground import off_ground
 from swarm.scenario.plain import nobody_can
 from swarm.survey.cameras import name_of
@@ -85,7 +86,7 @@ def _areas_and_other_tasks(mission: Mission) -> tuple[Sequence[Area], Sequence[T
     return areas, [task for task in mission.tasks if task.id not in theirs]
 
 
-_OF_UAV = ("acceleration_m_s2", "airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
+_OF_UAV = ("airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac")
 _OF_TASK = ("due_s", "opens_s", "closes_s", "trigger_m", "height_m")
 
 
@@ -113,8 +114,19 @@ def _uav(uav: Uav) -> dict[str, object]:
         "position_m": toml_place(uav.position_enu_m),
         "speed_m_s": uav.speed_m_s,
         **{key: value for key, value in more.items() if value is not None},
+        **_kind(uav),
         **_given(uav, _OF_UAV),
     }
+
+
+def _kind(uav: Uav) -> dict[str, object]:
+    """What it is, and how it turns or takes up speed."""
+    known = {
+        "vehicle": None if uav.vehicle is VehicleKind.COPTER else str(uav.vehicle),
+        "turn_radius_m": None if uav.turn_radius_m is None else float(f"{uav.turn_radius_m:.12g}"),
+        "acceleration_m_s2": uav.acceleration_m_s2 if uav.turn_radius_m is None else None,
+    }
+    return {key: value for key, value in known.items() if value is not None}
 
 
 def _base_lines(base: Base) -> Iterator[str]:

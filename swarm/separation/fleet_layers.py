@@ -65,7 +65,7 @@ def fleet_layers_m(mission: Mission, layers: FlightLayers | None = None) -> tupl
         if mission.terrain is not None and mission.band_m is not None:
             low_m, high_m = mission.band_m
             flown = layers_below(high_m, n_uav, FlightLayers(low_m, flown.spacing_m))
-        return tuple(flown.layer_m(index) for index in range(n_uav))
+        return tuple(flown.layer_of_m(uav.vehicle, index) for index, uav in enumerate(mission.uavs))
     n_layer = len(slabs.layers_m)
     keepers = keeper_rows(n_layer, max(1, n_uav))
     starts = [uav.position_enu_m for uav in mission.uavs]

@@ -357,7 +357,9 @@ def _layers_m(mission: Mission, uavs: Sequence[Uav]) -> list[float]:
     layers = layers_over(mission.terrain)
     places = {uav.id: index for index, uav in enumerate(mission.uavs)}
     return [
-        layers.layer_m(places.get(uav.id, row)) if uav.layer_m is None else uav.layer_m
+        layers.layer_of_m(uav.vehicle, places.get(uav.id, row))
+        if uav.layer_m is None
+        else uav.layer_m
         for row, uav in enumerate(uavs)
     ]
 
