@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from agent.core.station_words import StationAction, StationAsked
 from swarm.model import Zone
+from swarm.model.vehicles import VehicleKind
 from swarm.protocol.events import CommonAction, CommonEvent, MessagesReceived
 
 
@@ -35,6 +36,8 @@ class Prepare:
     begun: bool = False
     """An earlier life of this agent had started its motors for this, and never had it ready: if
     they run, nobody else has taken it since and it is ours, on the ground or on its way up."""
+    vehicle: VehicleKind = VehicleKind.COPTER
+    """What it is to be; any other is not started."""
 
 
 @dataclass(frozen=True, slots=True)

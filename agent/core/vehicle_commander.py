@@ -202,6 +202,7 @@ class VehicleCommander(AgentPart):
             left_in_air=self._left_in_air,
             acceleration_m_s2=me.acceleration_m_s2,
             begun=self.begun,
+            vehicle=me.vehicle,
         )
         self._order(order)
 

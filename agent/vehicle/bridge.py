@@ -42,9 +42,11 @@ from agent.vehicle.messages import (
     BatteryStatus,
     CommandAck,
     DecodedMessage,
+    ExtendedState,
     GroundHeartbeat,
     Heartbeat,
     Inbound,
+    LandedState,
     Position,
     SystemStatus,
 )
@@ -201,11 +203,26 @@ class Bridge:
                 session.say(*out)
                 self._on_ended(ended)
             case _:
-                session.vehicle.on_message(message, session.now_s)
-                session.on_message(message)
-                self._heed_charge(message)
+                self._take_note(message)
         self._activity.on_message(message)
+        if isinstance(message, Heartbeat) and (state := self._implied(message)) is not None:
+            self._take_note(state)
+            self._activity.on_message(state)
         self._settle()
+
+    def _take_note(self, message: Inbound) -> None:
+        """Of what is no heartbeat, position or acknowledgement."""
+        session = self._session
+        session.vehicle.on_message(message, session.now_s)
+        session.on_message(message)
+        self._heed_charge(message)
+
+    def _implied(self, heartbeat: Heartbeat) -> ExtendedState | None:
+        """Whether one that drives is under way: its motors tell, as it has no words for it."""
+        firmware = self._session.firmware
+        if firmware is None or not (firmware.traits.drives and firmware.flies(heartbeat)):
+            return None
+        return ExtendedState(LandedState.IN_AIR if heartbeat.armed else LandedState.ON_GROUND)
 
     def _heed_charge(self, message: Inbound) -> None:
         """Take what is known of the batteries each time that more is told."""

@@ -16,6 +16,7 @@ from agent.vehicle.messages import Inbound, ParameterRead
 from agent.vehicle.parameter_override import OverrideSpec
 from agent.vehicle.parameter_reading import PAUSE_TIMEOUTS, TRIES, ParameterReading
 from agent.vehicle.session import VehicleSession
+from swarm.model.vehicles import turn_radius_m
 
 _TRIES_ARMED: Final = 4
 """A vehicle that is about to take off has that many until what is known is told."""
@@ -103,6 +104,9 @@ class LimitsCheck:
         told = self._reading.kinematics
         planned_m_s2 = self._session.planned_m_s2
         parts = [f"its {each.name} of {each.value:g} is not believed" for each in told.absurd]
+        if told.circle is not None and planned_m_s2 is not None:
+            planned_m = turn_radius_m(self._speed_m_s, planned_m_s2)
+            parts += _otherwise(told.circle, planned_m, "m", "the plan counts on")
         if told.acceleration is not None and planned_m_s2 is not None:
             parts += _otherwise(told.acceleration, planned_m_s2, "m/s²", "the plan counts on")
         if told.speed is not None and told.speed.value < self._speed_m_s:
@@ -114,6 +118,7 @@ class LimitsCheck:
         session.absurd_parameters.update(each.name for each in told.absurd)
         acceleration_m_s2 = None if told.acceleration is None else told.acceleration.value
         session.set_m_s2 = acceleration_m_s2
+        session.told_circle_m = None if told.circle is None else told.circle.value
         limits = FlightLimits(told.leg_acceleration_m_s2(self._speed_m_s))
         if told.speed is not None:
             limits = replace(limits, speed_m_s=told.speed.value)

@@ -215,9 +215,12 @@ class LinkLoss:
         if self._place_enu_m is None:
             return False
         still = math.hypot(*velocity_enu_m_s) <= self._session.config.arrival_speed_m_s
+        ends, circle_m = (self._place_enu_m, *self._sent_to_enu_m), self._session.circle_m
+        if circle_m > 0.0:
+            aside_m = _ASTRAY_M + 2.0 * circle_m
+            return any(_near(place_enu_m, self._place_enu_m, end, aside_m) for end in ends)
         if still:
             # Somewhere between, somebody has stopped it.
-            ends = (self._place_enu_m, *self._sent_to_enu_m)
             return any(_near(place_enu_m, end, end) for end in ends)
         return any(
             _near(place_enu_m, self._place_enu_m, end)
@@ -232,15 +235,15 @@ def _leads_to(end_m: Point, place_m: Point, velocity_m_s: Point) -> bool:
     return sum(speed_m_s * (end - place) for speed_m_s, end, place in parts) > 0.0
 
 
-def _near(place_m: Point, from_m: Point, to_m: Point) -> bool:
+def _near(place_m: Point, from_m: Point, to_m: Point, aside_m: float = _ASTRAY_M) -> bool:
     """Whether a place lies along a way, at one of its heights or between them."""
     (east_m, north_m, up_m), (to_east_m, to_north_m, to_up_m) = place_m, to_m
     way_east_m, way_north_m = to_east_m - from_m[0], to_north_m - from_m[1]
     length2 = way_east_m**2 + way_north_m**2
     along = (east_m - from_m[0]) * way_east_m + (north_m - from_m[1]) * way_north_m
     share = min(1.0, max(0.0, along / length2)) if length2 > 0.0 else 1.0
-    aside_m = math.hypot(
+    found_m = math.hypot(
         east_m - from_m[0] - share * way_east_m, north_m - from_m[1] - share * way_north_m
     )
     low_m, high_m = sorted((from_m[2], to_up_m))
-    return aside_m <= _ASTRAY_M and low_m - _ASTRAY_M <= up_m <= high_m + _ASTRAY_M
+    return found_m <= aside_m and low_m - _ASTRAY_M <= up_m <= high_m + _ASTRAY_M

@@ -115,6 +115,7 @@ class Holding(Activity):
         """See whether it has stopped."""
         arrival_speed_m_s = self._session.config.arrival_speed_m_s
         slow = math.hypot(*position.velocity_enu_m_s) <= arrival_speed_m_s
+        slow |= not self._firmware.traits.stays  # where it was told to stay it circles
         if self._told and self._guided_seen and slow:
             self.done = True
 

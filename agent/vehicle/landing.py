@@ -188,7 +188,8 @@ class Landing(Activity):
     def _come_down(self, heartbeat: Heartbeat, firmware: Firmware) -> None:
         """Have it land, and disarm it if it does not disarm by itself."""
         session = self._session
-        if session.vehicle.landed is not LandedState.ON_GROUND:
+        stands = self._seen and not firmware.disarms_itself
+        if session.vehicle.landed is not LandedState.ON_GROUND and not stands:
             self._on_ground_since_s = None
         elif self._on_ground_since_s is None:
             self._on_ground_since_s = session.now_s

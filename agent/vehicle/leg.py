@@ -22,7 +22,7 @@ from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.flight_path import FlightPath
 from agent.vehicle.messages import Inbound, Position, StatusText
 from agent.vehicle.onboard_mission import OnboardMission
-from agent.vehicle.session import VehicleSession
+from agent.vehicle.session import PASSES_M, ArrivalRule, VehicleSession
 from swarm.model.frames import wgs84_from_enu
 from swarm.protocol.fields import Point
 
@@ -51,8 +51,9 @@ class ArrivalState(Enum):
 class ArrivalDetector:
     """Watches a vehicle come to a stop, at its target or elsewhere."""
 
-    def __init__(self, target_enu_m: Point, config: BridgeConfig) -> None:
+    def __init__(self, target_enu_m: Point, config: BridgeConfig, rule: ArrivalRule) -> None:
         self._target_enu_m = target_enu_m
+        self._rule = rule
         self._config = config
         self._still_since_s: float | None = None
         self._tellings = 0
@@ -63,12 +64,17 @@ class ArrivalDetector:
 
     def judge(self, position_enu_m: Point, velocity_enu_m_s: Point, now_s: float) -> ArrivalState:
         """Take one position and speed."""
-        self.distance_m = math.dist(position_enu_m, self._target_enu_m)
+        rule = self._rule
+        counted = 2 if rule.is_flat or rule.passes else 3
+        self.distance_m = math.dist(position_enu_m[:counted], self._target_enu_m[:counted])
+        beside_m = abs(position_enu_m[2] - self._target_enu_m[2])
+        if rule.passes and self.distance_m <= rule.radius_m and beside_m <= PASSES_M:
+            return ArrivalState.ARRIVED
         if math.hypot(*velocity_enu_m_s) > self._config.arrival_speed_m_s:
             self._still_since_s = None
             self.moved = True
             return ArrivalState.UNDERWAY
-        if self.distance_m <= self._config.acceptance_radius_m:
+        if self.distance_m <= self._rule.radius_m:
             return ArrivalState.ARRIVED
         if self._still_since_s is None:
             self._still_since_s = now_s
@@ -98,7 +104,7 @@ class _Leg(ABC):
     def __init__(self, session: VehicleSession, target_enu_m: Point) -> None:
         self._session = session
         self._target_enu_m = target_enu_m
-        self._arrival = ArrivalDetector(target_enu_m, session.config)
+        self._arrival = ArrivalDetector(target_enu_m, session.config, session.arrival)
         self._arrived = False
         self._failure: str | None = None
         self.stopped: str | None = None
@@ -310,7 +316,7 @@ class PathLeg(RepositionLeg):
         """Turn to the next corner in time; at the last of them, judge arrival."""
         session = self._session
         place_enu_m, velocity_enu_m_s = session.place_enu_m, position.velocity_enu_m_s
-        reached_m = session.config.acceptance_radius_m
+        reached_m = session.arrival.radius_m
         if self.accepted and self._path.advance(place_enu_m, velocity_enu_m_s, reached_m):
             self._aim_at(self._path.aim_enu_m)
         elif self._path.is_last:
@@ -322,7 +328,7 @@ class PathLeg(RepositionLeg):
     def _aim_at(self, target_enu_m: Point) -> None:
         moved, session = self._arrival.moved, self._session
         self._target_enu_m = target_enu_m
-        self._arrival = ArrivalDetector(target_enu_m, session.config)
+        self._arrival = ArrivalDetector(target_enu_m, session.config, session.arrival)
         self._arrival.moved = moved
         self._accepted = False
         self.start()
@@ -442,11 +448,12 @@ class Flying(Activity):
 
     def on_position(self, position: Position) -> None:
         """Judge speed and arrival."""
-        session = self._session
+        session, firmware = self._session, self._session.firmware
         told_m_s = session.pace_m_s or session.cruise_speed_m_s
         velocity_enu_m_s = position.velocity_enu_m_s
-        session.cruise_watch.judge(velocity_enu_m_s, told_m_s, session.now_s)
-        session.tell_caution("speed", session.cruise_watch.remark)
+        if firmware is not None and firmware.traits.stays:  # planes fly at a speed through the air
+            session.cruise_watch.judge(velocity_enu_m_s, told_m_s, session.now_s)
+            session.tell_caution("speed", session.cruise_watch.remark)
         self._leg.on_position(position)
 
     def outcome(self) -> Arrived | HandedOver | Refused | None:

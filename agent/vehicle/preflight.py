@@ -213,8 +213,8 @@ class CruiseSpeedSetting:
         if self._tries < self._session.config.commands.tries:
             self._ask()
         else:
-            names = " or ".join(self._values)
-            self.failure = f"the cruise speed cannot be set, neither by command nor by {names}"
+            names = f", neither by command nor by {' or '.join(self._values)}"
+            self.failure = f"the cruise speed cannot be set{names if self._values else ''}"
 
     def _ask(self) -> None:
         session = self._session
@@ -252,8 +252,13 @@ def aim(order: Prepare, place_enu_m: Point, position: Position) -> Prepare:
     return replace(order, position_enu_m=(*place_enu_m[:2], up_m), ground_up_m=None)
 
 
-def start_fault(order: Prepare, position: Position, config: BridgeConfig) -> str | None:
-    """Why the start cannot be reached from where the vehicle stands; None if it can."""
+def start_fault(
+    order: Prepare, position: Position, config: BridgeConfig, *, drives: bool = False
+) -> str | None:
+    """Why the start cannot be reached from where the vehicle stands; None if it can.
+
+    One that ``drives`` does not climb there.
+    """
     east_m, north_m, _ = enu_from_wgs84(
         config.origin, position.lat_deg, position.lon_deg, position.alt_m
     )
@@ -270,6 +275,8 @@ def start_fault(order: Prepare, position: Position, config: BridgeConfig) -> str
                 f"home is at {home_m:.0f} m above sea level, the scenario says "
                 f"{ground_alt_m:.0f} m there: correct [origin] alt_m, or position_m"
             )
+    if drives:
+        return None
     _, _, start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
     height_m = start_alt_m - home_m
     if height_m < config.takeoff_min_m:
@@ -281,6 +288,13 @@ def start_fault(order: Prepare, position: Position, config: BridgeConfig) -> str
     if height_m > 2.0 * config.fence_height_m:
         return f"the start lies {height_m:.0f} m above the vehicle's home"
     return None
+
+
+def wrong_kind(order: Prepare, firmware: Firmware | None) -> str | None:
+    """Why the vehicle is not the one that the scenario has; None if it may be."""
+    if firmware is None or firmware.kind is order.vehicle:
+        return None
+    return f"the vehicle is a {firmware.kind}, the scenario has a {order.vehicle}"
 
 
 def boot_state(session: VehicleSession, firmware: Firmware, heartbeat: Heartbeat) -> str:

@@ -35,6 +35,7 @@ from agent.vehicle.preflight import (
     home_alt_m,
     start_fault,
     with_warning,
+    wrong_kind,
 )
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.supervision import PilotConsent
@@ -184,8 +185,11 @@ class _Preparation:
             self.waiting_for = _NO_PLACE
         elif (airborne := firmware.airborne(vehicle)) is None:
             self.waiting_for = "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
-        elif objection := self._consent.objection(airborne=airborne):
-            self._flown_by_pilot |= airborne
+        elif objection := self._consent.objection(
+            # Whoever armed one that drives may stand beside it.
+            airborne=airborne and not firmware.traits.drives
+        ):
+            self._flown_by_pilot |= airborne and not firmware.traits.drives
             self._armed_by_others = True
             self.waiting_for = objection
         elif airborne:
@@ -256,7 +260,9 @@ class _Preparation:
         if objection := self._session.arming_objection():
             return self._wait(objection)
         place = vehicle.position
-        if place is not None and (fault := start_fault(self._order, place, self._config)):
+        drives = self._firmware.traits.drives
+        fault = place and start_fault(self._order, place, self._config, drives=drives)
+        if fault:
             return self._fail(fault)
         if objection := self._failsafes.objection:
             return self._wait(objection)
@@ -267,6 +273,8 @@ class _Preparation:
         if self._session.awaits_turn:
             return self._wait(_NOT_ITS_TURN)
         self._consent.arm()
+        if drives:
+            self._session.launched_enu_m = self._session.known_place_m()
         return self._ask(self._arm, self._firmware.arm())
 
     def _start_alt_m(self) -> float:
@@ -486,7 +494,8 @@ class Preparing(Activity):
     def advance(self) -> None:
         """Do what the state seen asks for next, and say what is waited for."""
         session, heartbeat = self._session, self._session.vehicle.heartbeat
-        if (reason := session.missing()) is not None:
+        reason = session.missing() or wrong_kind(self.order, session.firmware)
+        if reason is not None:
             session.tell_not_ready(reason)
             return
         if heartbeat is None or session.firmware is None:

@@ -17,10 +17,12 @@ from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import CommandEnded, result_text
 from agent.vehicle.firmware.profile import UNCHANGED, Firmware
 from agent.vehicle.leg import TARGET_TAG, reposition_leg
-from agent.vehicle.messages import Heartbeat, LandedState, Position
+from agent.vehicle.messages import Heartbeat, LandedState, Outbound, Position
 from agent.vehicle.session import VehicleSession
 from swarm.protocol.fields import Point
 
+_HOME_M = 15.0
+"""Who stands no farther from where it started is at home, if it drives."""
 DISARMED_LONG_S = 5.0
 """A vehicle disarmed for that long is down, even if it does not say that it landed."""
 
@@ -49,6 +51,8 @@ class Returning(Activity):
         self._return_via = return_via
         self._firmware = firmware
         self._mode = session.repeated("return", session.config.mode_tries)
+        self._disarm = session.repeated("disarm", session.config.mode_tries)
+        self._still_since_s: float | None = None
         self._disarmed_since_s: float | None = None
         self._seen = self._told_seen = False
         self._lands: bool | None = False if return_via is None and not session.guard else None
@@ -66,6 +70,7 @@ class Returning(Activity):
         if self._return_via is not None:
             self._return_via.on_ended(ended)
         self._mode.on_ended(ended, self._session.now_s)
+        self._disarm.on_ended(ended, self._session.now_s)
 
     def expects(self, heartbeat: Heartbeat) -> bool:
         """Whether that mode fits the return; anything else is somebody else's doing."""
@@ -102,7 +107,9 @@ class Returning(Activity):
         """Return from where the vehicle is."""
         if self._return_via is not None:
             self._return_via.end()
-            self._lands = (self._return_via.arrived and self.order.land) or None
+            # One that cannot stay is not above the place, and its return mode lands it there.
+            lands = self.order.land and self._firmware.traits.stays
+            self._lands = (self._return_via.arrived and lands) or None
             self._return_via = None
 
     def go_by(self, order: Return, return_via: ReturnVia) -> None:
@@ -123,7 +130,11 @@ class Returning(Activity):
         return session.way_objection(((*home_enu_m[:2], place_enu_m[2]),)) is not None
 
     def on_position(self, position: Position) -> None:
-        """See whether it is where it flies to first."""
+        """See whether it is where it flies to first, and whether it stands still."""
+        if math.hypot(*position.velocity_enu_m_s) > self._session.config.arrival_speed_m_s:
+            self._still_since_s = None
+        elif self._still_since_s is None:
+            self._still_since_s = self._session.now_s
         if self._return_via is not None:
             self._return_via.on_position(position)
 
@@ -142,6 +153,8 @@ class Returning(Activity):
             self._disarmed_since_s = None
         elif self._disarmed_since_s is None:
             self._disarmed_since_s = session.now_s
+        if heartbeat.armed and self._seen and not self._firmware.disarms_itself:
+            session.say(*self._disarm_at_rest())
         if not heartbeat.armed or not self.obeys(heartbeat.custom_mode):
             return
         if self._lands is None:
@@ -156,6 +169,21 @@ class Returning(Activity):
             self.failure = f"the {what} mode cannot be set ({why})"
         else:
             session.say(*out)
+
+    def _disarm_at_rest(self) -> tuple[Outbound, ...]:
+        """What stops the motors of a vehicle that has come home and leaves them on."""
+        session, still_since_s = self._session, self._still_since_s
+        home_enu_m, place_enu_m = session.launched_enu_m, session.known_place_m()
+        if still_since_s is None or place_enu_m is None:
+            return ()
+        at_home = (
+            self._lands
+            or home_enu_m is None
+            or math.dist(home_enu_m[:2], place_enu_m[:2]) <= _HOME_M
+        )
+        if not at_home or session.now_s - still_since_s < session.config.stall_timeout_s:
+            return ()
+        return self._disarm.give(self._firmware.disarm(), session.now_s) or ()
 
     @property
     def is_down(self) -> bool:

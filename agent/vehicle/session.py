@@ -15,6 +15,7 @@ from agent.vehicle.camera_control import CameraControl
 from agent.vehicle.config import BridgeConfig, CommandStyle
 from agent.vehicle.contact import Contact
 from agent.vehicle.conversation import Conversation
+from agent.vehicle.firmware import unsupported
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import Inbound
 from agent.vehicle.onboard_fence import OnboardFence
@@ -51,6 +52,26 @@ class LinkOpened:
 @dataclass(frozen=True, slots=True)
 class LinkClosed:
     """The link is closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class ArrivalRule:
+    """When a vehicle is at its target."""
+
+    radius_m: float
+    """So near it is there."""
+    is_flat: bool = False
+    """Heights do not count, as it cannot change its own."""
+    passes: bool = False
+    """It need not stop, and its height may differ by no more than `PASSES_M`."""
+
+
+PASSES_M = 15.0
+"""Height of a target by which it may be passed [m]."""
+_CIRCLE_M = 60.0
+"""Of a vehicle that has not told its own: ArduPlane's WP_LOITER_RAD."""
+_CIRCLE_FRAC = 1.15
+"""Of the radius of its circle, within which it is on it."""
 
 
 BridgeEvent = BytesReceived | TimePassed | LinkOpened | LinkClosed | VehicleOrder
@@ -104,6 +125,8 @@ class VehicleSession(Conversation):
         """Acceleration that the mission counts on; None: it says none."""
         self.set_m_s2: float | None = None
         """Acceleration that is set on the vehicle; None: not known, or endless."""
+        self.told_circle_m: float | None = None
+        """Radius of its circles by its parameters; None: not known, or it makes none."""
         self.told_limits = FlightLimits()
         """How it flies by its parameters, as was told last."""
         self.absurd_parameters: set[str] = set()
@@ -120,6 +143,23 @@ class VehicleSession(Conversation):
         """Where the vehicle is, by its newest position [m; mission origin]."""
         self.sent_to_enu_m: deque[Point] = deque(maxlen=_PLACES)
         """Where the vehicle was last told to fly: of the newest it may not have heard."""
+
+    @property
+    def arrival(self) -> ArrivalRule:
+        """When it is where it was told to be."""
+        radius_m, firmware = self.config.acceptance_radius_m, self.firmware
+        if firmware is None:
+            return ArrivalRule(radius_m)
+        if not firmware.traits.stays:
+            return ArrivalRule(max(radius_m, _CIRCLE_FRAC * self.circle_m), passes=True)
+        return ArrivalRule(max(radius_m, firmware.stops_within_m), firmware.traits.drives)
+
+    @property
+    def circle_m(self) -> float:
+        """Radius of the circle on which it waits; 0 of one that stays where it is [m]."""
+        if self.firmware is None or self.firmware.traits.stays:
+            return 0.0
+        return self.told_circle_m or _CIRCLE_M
 
     @property
     def corner_m(self) -> float:
@@ -170,11 +210,12 @@ class VehicleSession(Conversation):
         """Why there is no vehicle to command yet, in words; None if there is one."""
         heartbeat, contact, wanted = self.vehicle.heartbeat, self.contact, self.config.system_id
         if heartbeat is not None and not self.silent:
-            unsupported = (
-                f"autopilot {heartbeat.autopilot} on vehicle type {heartbeat.vehicle_type} "
-                "(MAV_AUTOPILOT, MAV_TYPE) is not supported"
-            )
-            return unsupported if self.firmware is None else None
+            if self.firmware is None:
+                return unsupported(heartbeat)
+            if self.config.command is CommandStyle.MISSION and not self.firmware.takes_missions:
+                kind = self.firmware.kind
+                return f"a {kind} is not commanded by missions: leave out --command mission"
+            return None
         if not contact.link_up:
             return "no link to the autopilot"
         if heartbeat is None and contact.wrong_autopilot is not None:

@@ -13,6 +13,7 @@ it; see `agent.vehicle.preparation`.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from agent.core.interface import GoTo, Prepare, Swap
 from agent.vehicle.activity import Activity, FlightPhase
@@ -179,6 +180,8 @@ class Departing(Preparing):
         prepare = Prepare(
             (base[0], base[1], first[2]), session.cruise_speed_m_s, ground_up_m=base[2]
         )
+        if session.firmware is not None:
+            prepare = replace(prepare, vehicle=session.firmware.kind)
         super().__init__(session, prepare, ours=False)
         self.standing = standing
         self.next_order = next_order

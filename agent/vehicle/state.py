@@ -152,7 +152,7 @@ class VehicleState:
                 self.charge.on_battery(number, battery_frac, now_s, armed=self.armed)
             case EkfStatus(flags):
                 self.ekf_flags = flags
-            case ExtendedState(landed):
+            case ExtendedState(landed) if landed is not LandedState.UNDEFINED:
                 self.landed = landed
             case AvailableMode(mode, name) if name and (
                 mode in self.told_modes or len(self.told_modes) < _MOST_MODES

@@ -1,7 +1,6 @@
-"""ArduPilot's copters, as ArduCopter 4.8 behaves.
+"""What ArduPilot's vehicles have in common, and its copters, as ArduCopter 4.8 behaves.
 
-Leaves out: planes, rovers and submarines, whose modes have other numbers and which
-take off otherwise.
+Leaves out: planes that need a runway, and submarines.
 
 Sources: https://mavlink.io/en/messages/ardupilotmega.html and
 https://ardupilot.org/dev/docs/copter-commands-in-guided-mode.html
@@ -11,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import ClassVar
 
 from agent.vehicle.firmware.failsafes import ARDUCOPTER_NAMES, Failsafes, arducopter_failsafes
 from agent.vehicle.firmware.fences import ARDUCOPTER_FENCE_NAMES, FenceSetup, arducopter_fence
@@ -26,6 +26,7 @@ from agent.vehicle.messages import (
     EkfStatus,
     ExtendedState,
     Heartbeat,
+    Inbound,
     LandedState,
     MissionCurrent,
     SystemStatus,
@@ -39,63 +40,16 @@ _STATE_ACTIVE = 4
 _CMD_NAV_TAKEOFF = 22
 
 
-class ArduCopter(Firmware):
-    """The firmware of ArduPilot's copters.
-
-    It cannot be paused: GUIDED flies on to its target, and being told GUIDED again changes
-    nothing. BRAKE and LOITER would stop it, but in a mode in which it no longer obeys, as if its
-    pilot had taken it; DO_PAUSE_CONTINUE pauses every later target too until it is told to
-    continue, which may get lost.
-    """
+class ArduPilot(Firmware):
+    """What its copters, rovers and planes have in common."""
 
     autopilot = 3
-    mode_names = MappingProxyType(
-        {
-            (0,): "STABILIZE",
-            (1,): "ACRO",
-            (2,): "ALT_HOLD",
-            _AUTO: "AUTO",
-            _GUIDED: "GUIDED",
-            (5,): "LOITER",
-            _RTL: "RTL",
-            (7,): "CIRCLE",
-            _LAND: "LAND",
-            (11,): "DRIFT",
-            (13,): "SPORT",
-            (14,): "FLIP",
-            (15,): "AUTOTUNE",
-            (16,): "POSHOLD",
-            (17,): "BRAKE",
-            (18,): "THROW",
-            (19,): "AVOID_ADSB",
-            (20,): "GUIDED_NOGPS",
-            _SMART_RTL: "SMART_RTL",
-            (22,): "FLOWHOLD",
-            (23,): "FOLLOW",
-            (24,): "ZIGZAG",
-            (25,): "SYSTEMID",
-            (26,): "AUTOROTATE",
-            _AUTO_RTL: "AUTO_RTL",
-            (28,): "TURTLE",
-        }
-    )
-    commanded_mode = _GUIDED
     commanded_mode_name = "GUIDED"
     commanded_by_choice = True
     """GUIDED is entered on command or by a switch only."""
     pilots_stop_it_there = False
     """Pilots and ground stations pause in other modes."""
-    mission_mode = _AUTO
-    """Refused on the ground unless the mission begins with a takeoff."""
-    return_mode = _RTL
-    land_mode = _LAND
-    returning_modes = frozenset({_RTL, _LAND, _SMART_RTL, _AUTO_RTL})
-    speed_parameters = (SpeedParameter("WP_SPD", 1.0), SpeedParameter("WPNAV_SPEED", 100.0))
-    """WP_SPD [m/s] since 4.8, WPNAV_SPEED [cm/s] before."""
-    failsafe_names = ARDUCOPTER_NAMES
-    limit_parameters = ARDUCOPTER_LIMITS
-    fence_names = ARDUCOPTER_FENCE_NAMES
-    streams = (
+    streams: ClassVar[tuple[tuple[int, type[Inbound]], ...]] = (
         (1, SystemStatus),
         (193, EkfStatus),
         (245, ExtendedState),
@@ -105,11 +59,10 @@ class ArduCopter(Firmware):
     """ArduPilot streams nothing unasked."""
     mission_vehicle_items = 1
     """Item 0 is home, whatever is sent as such."""
-    missions_give_way = True
-    """It flies to targets as in GUIDED, and to waypoints on a slower track."""
+    missions_give_way = False
     missions_begin_anew = False
-    targets_turn_nose = False
     """Items are taken over one by one, and the number of the current one stays."""
+    targets_turn_nose = False
 
     def has_rebooted(self, before: Heartbeat, heartbeat: Heartbeat) -> bool:
         """It was past booting, and is not any more."""
@@ -148,21 +101,9 @@ class ArduCopter(Firmware):
         fenced = vehicle.fence_enabled and result == _RESULT_FAILED
         return f"{text}, probably by its own fence" if fenced else text
 
-    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
-        """It listens to the heartbeats of certain system ids only."""
-        return arducopter_failsafes(values, own_system_id)
-
-    def kinematics(self, values: Mapping[str, float]) -> Kinematics:
-        """As it flies to targets, in missions too."""
-        return arducopter_kinematics(values)
-
     def fence_setup(self, values: Mapping[str, float]) -> FenceSetup:
         """Polygons are heeded where they are switched on."""
         return arducopter_fence(values)
-
-    def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
-        """ArduCopter reads the height as above home."""
-        return CommandLong(_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, alt_m - home_alt_m))
 
     def reposition_params(self, speed_m_s: float) -> tuple[float, float]:
         """In GUIDED only, at the speed set before.
@@ -176,3 +117,70 @@ class ArduCopter(Firmware):
     def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
         """Copters keep the hold time only; their radius is WPNAV_RADIUS."""
         return (hold_s, 0.0, 0.0, 0.0)
+
+
+class ArduCopter(ArduPilot):
+    """The firmware of ArduPilot's copters.
+
+    It cannot be paused: GUIDED flies on to its target, and being told GUIDED again changes
+    nothing. BRAKE and LOITER would stop it, but in a mode in which it no longer obeys, as if its
+    pilot had taken it; DO_PAUSE_CONTINUE pauses every later target too until it is told to
+    continue, which may get lost.
+    """
+
+    name = "ArduCopter"
+    mode_names = MappingProxyType(
+        {
+            (0,): "STABILIZE",
+            (1,): "ACRO",
+            (2,): "ALT_HOLD",
+            _AUTO: "AUTO",
+            _GUIDED: "GUIDED",
+            (5,): "LOITER",
+            _RTL: "RTL",
+            (7,): "CIRCLE",
+            _LAND: "LAND",
+            (11,): "DRIFT",
+            (13,): "SPORT",
+            (14,): "FLIP",
+            (15,): "AUTOTUNE",
+            (16,): "POSHOLD",
+            (17,): "BRAKE",
+            (18,): "THROW",
+            (19,): "AVOID_ADSB",
+            (20,): "GUIDED_NOGPS",
+            _SMART_RTL: "SMART_RTL",
+            (22,): "FLOWHOLD",
+            (23,): "FOLLOW",
+            (24,): "ZIGZAG",
+            (25,): "SYSTEMID",
+            (26,): "AUTOROTATE",
+            _AUTO_RTL: "AUTO_RTL",
+            (28,): "TURTLE",
+        }
+    )
+    commanded_mode = _GUIDED
+    mission_mode = _AUTO
+    """Refused on the ground unless the mission begins with a takeoff."""
+    return_mode = _RTL
+    land_mode = _LAND
+    returning_modes = frozenset({_RTL, _LAND, _SMART_RTL, _AUTO_RTL})
+    speed_parameters = (SpeedParameter("WP_SPD", 1.0), SpeedParameter("WPNAV_SPEED", 100.0))
+    """WP_SPD [m/s] since 4.8, WPNAV_SPEED [cm/s] before."""
+    failsafe_names = ARDUCOPTER_NAMES
+    limit_parameters = ARDUCOPTER_LIMITS
+    fence_names = ARDUCOPTER_FENCE_NAMES
+    missions_give_way = True
+    """It flies to targets as in GUIDED, and to waypoints on a slower track."""
+
+    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
+        """It listens to the heartbeats of certain system ids only."""
+        return arducopter_failsafes(values, own_system_id)
+
+    def kinematics(self, values: Mapping[str, float]) -> Kinematics:
+        """As it flies to targets, in missions too."""
+        return arducopter_kinematics(values)
+
+    def takeoff(self, alt_m: float, home_alt_m: float) -> CommandLong:
+        """ArduCopter reads the height as above home."""
+        return CommandLong(_CMD_NAV_TAKEOFF, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, alt_m - home_alt_m))

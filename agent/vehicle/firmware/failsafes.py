@@ -3,8 +3,9 @@
 A parameter that is not known brings no vehicle home.
 
 Sources: ArduCopter's events.cpp and parameters FS_GCS_ENABLE, FS_GCS_TIMEOUT, MAV_GCS_SYSID
-(SYSID_MYGCS before 4.7), MAV_GCS_SYSID_HI and BATT_FS_LOW_ACT; PX4's failsafe.cpp and
-parameters NAV_DLL_ACT, COM_DL_LOSS_T, COM_DLL_EXCEPT and COM_LOW_BAT_ACT.
+(SYSID_MYGCS before 4.7), MAV_GCS_SYSID_HI and BATT_FS_LOW_ACT; Rover's failsafe.cpp; ArduPlane's
+events.cpp and parameters FS_GCS_ENABL, FS_LONG_ACTN, FS_LONG_TIMEOUT and Q_RTL_MODE; PX4's
+failsafe.cpp and parameters NAV_DLL_ACT, COM_DL_LOSS_T, COM_DLL_EXCEPT and COM_LOW_BAT_ACT.
 """
 
 from __future__ import annotations
@@ -20,6 +21,16 @@ ARDUCOPTER_NAMES: Names = (
     ("MAV_GCS_SYSID", "SYSID_MYGCS"),
     ("MAV_GCS_SYSID_HI",),
     ("FS_GCS_TIMEOUT",),
+    ("BATT_FS_LOW_ACT",),
+)
+ARDUROVER_NAMES: Names = (("BATT_FS_LOW_ACT",),)
+QUADPLANE_NAMES: Names = (
+    ("FS_GCS_ENABL",),
+    ("FS_LONG_ACTN",),
+    ("FS_LONG_TIMEOUT",),
+    ("Q_RTL_MODE",),
+    ("MAV_GCS_SYSID", "SYSID_MYGCS"),
+    ("MAV_GCS_SYSID_HI",),
     ("BATT_FS_LOW_ACT",),
 )
 PX4_NAMES: Names = (
@@ -56,16 +67,47 @@ def arducopter_failsafes(values: Mapping[str, float], own_system_id: int) -> Fai
     action = values.get("FS_GCS_ENABLE")
     if not action:
         return _stays("hovers", "FS_GCS_ENABLE", action, "set FS_GCS_ENABLE 1", battery)
+    if (deaf := _deaf("hovers", values, own_system_id, battery)) is not None:
+        return deaf
+    does = "lands" if action in _LANDS_ARDUCOPTER else "returns"
+    return Failsafes(True, _after(does, values.get("FS_GCS_TIMEOUT")), "", battery)
+
+
+def ardurover_failsafes(values: Mapping[str, float]) -> Failsafes:
+    """Those of a Rover: it drives to its target and stands there, or as FS_ACTION has it."""
+    return Failsafes(True, "stops at its target", "", _battery("BATT_FS_LOW_ACT", values))
+
+
+def _deaf(
+    does: str, values: Mapping[str, float], own_system_id: int, battery: str | None
+) -> Failsafes | None:
+    """Those of an ArduPilot that does not listen to our heartbeats; None: it does."""
     name = "SYSID_MYGCS" if "SYSID_MYGCS" in values else "MAV_GCS_SYSID"
     heard = values.get(name)
     remedy = f"set {name} {own_system_id}"
     if heard is None:
-        return _stays("hovers", name, None, remedy, battery)
+        return _stays(does, name, None, remedy, battery)
     if not heard <= own_system_id <= max(heard, values.get("MAV_GCS_SYSID_HI", 0.0)):
-        lost = f"hovers (its failsafe listens to system id {heard:.0f}, not {own_system_id})"
+        lost = f"{does} (its failsafe listens to system id {heard:.0f}, not {own_system_id})"
         return Failsafes(False, lost, remedy, battery)
-    does = "lands" if action in _LANDS_ARDUCOPTER else "returns"
-    return Failsafes(True, _after(does, values.get("FS_GCS_TIMEOUT")), "", battery)
+    return None
+
+
+def quadplane_failsafes(values: Mapping[str, float], own_system_id: int) -> Failsafes:
+    """Those of a QuadPlane: it comes home and lands there, or circles until it is empty."""
+    battery = _battery("BATT_FS_LOW_ACT", values)
+    asked = (
+        ("FS_GCS_ENABL", (1, 2), "set FS_GCS_ENABL 1"),
+        ("FS_LONG_ACTN", (1,), "set FS_LONG_ACTN 1"),
+        ("Q_RTL_MODE", (1, 2, 3), "set Q_RTL_MODE 1"),
+    )
+    for name, good, remedy in asked:
+        value = values.get(name)
+        if value is None or int(value) not in good:
+            return _stays("circles", name, value, remedy, battery)
+    if (deaf := _deaf("circles", values, own_system_id, battery)) is not None:
+        return deaf
+    return Failsafes(True, _after("returns", values.get("FS_LONG_TIMEOUT")), "", battery)
 
 
 def px4_failsafes(values: Mapping[str, float]) -> Failsafes:
@@ -87,7 +129,7 @@ def px4_failsafes(values: Mapping[str, float]) -> Failsafes:
 def _stays(
     does: str, name: str, value: float | None, remedy: str, battery: str | None
 ) -> Failsafes:
-    does = "may hover" if value is None else does
+    does = f"may {does.removesuffix('s')}" if value is None else does
     return Failsafes(False, f"{does} ({_told(name, value)})", remedy, battery)
 
 

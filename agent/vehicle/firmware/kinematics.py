@@ -9,12 +9,14 @@ A leg from rest to rest takes d/v + v/a at best. What a limit of jerk j costs be
   (`computeMaxSpeedFromDistance` of its TrajMath.hpp): integrated down to the speed u of an arrival,
   (2·a/j)·(ln(v/u) − 1) longer than with a all along.
 
-Both are told as the acceleration with which v/a alone takes as long: short legs, on which v is
+- Rover drives an S-curve, and every change of its acceleration takes a/j: a/j in all.
+
+All are told as the acceleration with which v/a alone takes as long: short legs, on which v is
 never reached, differ from that by a tenth of a second.
 
 Sources: AC_WPNav.cpp, AC_PosControl.cpp and mode_guided.cpp of ArduPilot 4.8, its parameter list
 for the names and units up to 4.6 (WPNAV_ACCEL [cm/s²], ANGLE_MAX [cdeg], PSC_JERK_XY);
-FlightTaskAuto and multicopter_*_params.c of PX4 1.17.
+FlightTaskAuto and multicopter_*_params.c of PX4 1.17; AR_WPNav.cpp of Rover 4.8.
 
 Leaves out: speeds up and down, and what drag forbids.
 """
@@ -23,9 +25,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final
+
+from swarm.model.vehicles import turning_acceleration_m_s2
 
 _GRAVITY_M_S2: Final = 9.80665
 _ARRIVAL_M_S: Final = 0.5
@@ -43,6 +47,8 @@ class LegLimit(Enum):
     JERK = "jerk"
     LEAN = "lean"
     SPEED = "speed"
+    THROTTLE = "acceleration of the throttle"
+    CIRCLE = "radius of its circles"
 
 
 _CREDIBLE: Final = {
@@ -50,8 +56,11 @@ _CREDIBLE: Final = {
     LegLimit.JERK: (0.1, math.inf),
     LegLimit.LEAN: (1.0, 89.9),
     LegLimit.SPEED: (0.1, math.inf),
+    LegLimit.THROTTLE: (0.1, math.inf),
+    LegLimit.CIRCLE: (5.0, 10_000.0),
 }
-"""What is believed: accelerations [m/s²], jerks [m/s³], angles of lean [deg] and speeds [m/s]."""
+"""What is believed: accelerations [m/s²], jerks [m/s³], angles of lean [deg], speeds [m/s] and
+radii [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +90,14 @@ PX4_LIMITS: Final = (
     LimitParameter(LegLimit.LEAN, "MPC_TILTMAX_AIR"),
     LimitParameter(LegLimit.SPEED, "MPC_XY_VEL_MAX"),
 )
+ARDUROVER_LIMITS: Final = (
+    LimitParameter(LegLimit.ACCELERATION, "WP_ACCEL"),
+    LimitParameter(LegLimit.THROTTLE, "ATC_ACCEL_MAX"),
+    LimitParameter(LegLimit.JERK, "WP_JERK"),
+)
+"""How fast it is able to drive no parameter says."""
+QUADPLANE_LIMITS: Final = (LimitParameter(LegLimit.CIRCLE, "WP_LOITER_RAD"),)
+"""To the left where it is negative."""
 
 JerkCost = Callable[[float, float, float], float]
 """Time [s] of a leg beyond d/v + v/a, of speed [m/s], acceleration [m/s²] and jerk [m/s³]."""
@@ -96,6 +113,18 @@ def px4_jerk_s(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> 
     """See `JerkCost`."""
     slowing = max(0.0, math.log(max(1.0, speed_m_s / _ARRIVAL_M_S)) - 1.0)
     return acceleration_m_s2 / jerk_m_s3 * (0.5 + 2.0 * slowing)
+
+
+def no_jerk_s(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
+    """See `JerkCost`: of what turns, and is not limited by jerk."""
+    del speed_m_s, acceleration_m_s2, jerk_m_s3
+    return 0.0
+
+
+def ardurover_jerk_s(speed_m_s: float, acceleration_m_s2: float, jerk_m_s3: float) -> float:
+    """See `JerkCost`."""
+    del speed_m_s
+    return acceleration_m_s2 / jerk_m_s3
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,9 +148,15 @@ class Kinematics:
     absurd: tuple[NamedLimit, ...]
     """What nobody would believe."""
     jerk_cost_s: JerkCost
+    throttle: NamedLimit | None = None
+    """Acceleration that its motors may have [m/s²], where another one limits its legs."""
+    circle: NamedLimit | None = None
+    """Radius on which it waits, and turns [m]; None of one that stays."""
 
     def leg_acceleration_m_s2(self, speed_m_s: float) -> float | None:
         """With which d/v + v/a is the time of a leg, the limit of jerk included; None: unknown."""
+        if self.circle is not None:
+            return turning_acceleration_m_s2(speed_m_s, self.circle.value)
         if self.acceleration is None:
             return None
         set_m_s2 = self.acceleration.value
@@ -155,7 +190,8 @@ def kinematics_of(
     if acceleration is not None and acceleration.value > _ENDLESS_M_S2:
         acceleration = None
     jerk_m_s3 = None if jerk is None else jerk.value
-    return Kinematics(acceleration, jerk_m_s3, speed, tuple(absurd), jerk_cost_s)
+    throttle, circle = limits.get(LegLimit.THROTTLE), limits.get(LegLimit.CIRCLE)
+    return Kinematics(acceleration, jerk_m_s3, speed, tuple(absurd), jerk_cost_s, throttle, circle)
 
 
 def arducopter_kinematics(values: Mapping[str, float]) -> Kinematics:
@@ -171,3 +207,21 @@ def arducopter_kinematics(values: Mapping[str, float]) -> Kinematics:
 def px4_kinematics(values: Mapping[str, float]) -> Kinematics:
     """Of a PX4."""
     return kinematics_of(PX4_LIMITS, values, px4_jerk_s)
+
+
+def ardurover_kinematics(values: Mapping[str, float]) -> Kinematics:
+    """Of a Rover; limits of 0 are none, and without one of jerk it is as large as acceleration."""
+    set_values = {name: value for name, value in values.items() if value != 0.0}
+    found = kinematics_of(ARDUROVER_LIMITS, set_values, ardurover_jerk_s)
+    slow = [each for each in (found.acceleration, found.throttle) if each is not None]
+    acceleration = min(slow, key=lambda each: each.value, default=None)
+    jerk_m_s3 = found.jerk_m_s3
+    if jerk_m_s3 is None and acceleration is not None:
+        jerk_m_s3 = acceleration.value
+    return replace(found, acceleration=acceleration, jerk_m_s3=jerk_m_s3)
+
+
+def quadplane_kinematics(values: Mapping[str, float]) -> Kinematics:
+    """Of a QuadPlane, by the radius of its circles."""
+    radii_m = {name: abs(value) for name, value in values.items()}
+    return kinematics_of(QUADPLANE_LIMITS, radii_m, no_jerk_s)

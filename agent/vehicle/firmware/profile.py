@@ -1,4 +1,4 @@
-"""What the bridge must know of a multicopter's firmware; one subclass for each.
+"""What the bridge must know of a vehicle's firmware; one subclass for each.
 
 Commands: https://mavlink.io/en/messages/common.html
 """
@@ -26,6 +26,7 @@ from agent.vehicle.messages import (
 )
 from agent.vehicle.parameter_override import OverrideSpec
 from agent.vehicle.state import VehicleState
+from swarm.model.vehicles import TRAITS, VehicleKind, VehicleTraits
 
 Mode = tuple[int, ...]
 """A mode by the numbers that the firmware has for it."""
@@ -33,7 +34,7 @@ Mode = tuple[int, ...]
 UNCHANGED = -1.0
 """What leaves a speed or throttle as it is."""
 
-_COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
+COPTER_TYPES = frozenset({2, 3, 4, 13, 14, 15, 29, 35})
 """MAV_TYPE of quad-, coaxial, heli-, hexa-, octo-, tri-, dodeca- and decacopter."""
 _STATE_STANDBY = 3
 _CMD_DO_SET_MODE = 176
@@ -65,6 +66,17 @@ class Firmware(ABC):
 
     autopilot: ClassVar[int]
     """MAV_AUTOPILOT."""
+    kind: ClassVar[VehicleKind] = VehicleKind.COPTER
+    vehicle_types: ClassVar[frozenset[int]] = COPTER_TYPES
+    """MAV_TYPE of what it flies or drives."""
+    name: ClassVar[str]
+    """For people."""
+    takes_missions: ClassVar[bool] = True
+    """Whether it is known how to command it by missions."""
+    stops_within_m: ClassVar[float] = 0.0
+    """How far from a target it may stop for good; 0: at it."""
+    disarms_itself: ClassVar[bool] = True
+    """Its motors stop by themselves where it has come home or landed."""
     mode_names: ClassVar[Mapping[Mode, str]]
     """For people."""
     commanded_mode: ClassVar[Mode]
@@ -113,7 +125,13 @@ class Firmware(ABC):
 
     def flies(self, heartbeat: Heartbeat) -> bool:
         """Whether this firmware is the one of that vehicle."""
-        return heartbeat.autopilot == self.autopilot and heartbeat.vehicle_type in _COPTER_TYPES
+        known = heartbeat.vehicle_type in self.vehicle_types
+        return heartbeat.autopilot == self.autopilot and known
+
+    @property
+    def traits(self) -> VehicleTraits:
+        """Of the kind of vehicle."""
+        return TRAITS[self.kind]
 
     def mode(self, custom_mode: int) -> Mode:
         """The mode that a heartbeat tells."""

@@ -49,6 +49,7 @@ class Px4Copter(Firmware):
     """The firmware of PX4's multicopters."""
 
     autopilot = 12
+    name = "PX4"
     mode_names = MappingProxyType(
         {
             (1, 0): "MANUAL",
