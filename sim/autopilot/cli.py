@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from sim.autopilot.firmware import FirmwareModelName
+from sim.autopilot.firmware import FirmwareModelName, check_simulated
 from swarm.runtime.errors import remedy_for_name
 from swarm.runtime.log import LogFormat, LogLevel, configure_logging, get_logger
 from swarm.runtime.options import (
@@ -200,6 +200,7 @@ def autopilot(
         check_wind(math.hypot(*physics.wind_enu_m_s), still)
     faults = faults_by_uav(fault or (), known)
     fleet = fleet_of(mission, wanted, system_id, physics)
+    check_simulated(flavour, [member.config.vehicle for member in fleet], "--flavour")
     keys: dict[str, SigningKey] = {}
     if signing_key is not None:
         keys = {each.uav: load_signing_key(signing_key_of(each.uav, signing_key)) for each in fleet}
@@ -237,7 +238,9 @@ async def _serve(
         for place, member in enumerate(fleet):
             start_s = clock.now_s()
             vehicle: ServedVehicle
-            vehicle = sound = SimulatedAutopilot(member.config, firmware_model(flavour), start_s)
+            vehicle = sound = SimulatedAutopilot(
+                member.config, firmware_model(flavour, member.config.vehicle), start_s
+            )
             if own_faults := faults.get(member.uav):
                 vehicle = FaultyAutopilot(sound, own_faults, start_s)
             own = endpoint.shifted(place)

@@ -208,6 +208,8 @@ class CommandExecutor:
 
     def _take_off(self, command: AutopilotCommand, now_s: float) -> int:
         pilot = self._pilot
+        if pilot.flavour.drives:
+            return _UNSUPPORTED
         up_m: float | None = None
         if pilot.flavour.take_off_above_home:
             if not math.isfinite(command.height_m) or command.frame not in ABOVE_HOME_FRAMES:

@@ -11,13 +11,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from sim.autopilot.circling_motion import CirclingMotion
 from sim.autopilot.turning_motion import TurningMotion
 from sim.world.motion import IdealMotion, Motion, Point, SmoothMotion
 from sim.world.wind import Wind, WindyMotion, gusts_of
-from swarm.model import Mission, UavId
+from swarm.model import Mission, Uav, UavId
 from swarm.model.frames import DEFAULT_ORIGIN, Origin
 from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.model.terrain import Terrain
+from swarm.model.vehicles import TRAITS, VehicleKind
 
 _AIRSPEED_PER_CRUISE = 1.5
 _MAX_SYSTEM_ID = 254
@@ -150,6 +152,9 @@ class VehicleConfig:
     """Polygons to stay in or out of can be uploaded."""
     wind: Wind | None = None
     """The air it flies in; None: still."""
+    vehicle: VehicleKind = VehicleKind.COPTER
+    circle_m: float | None = None
+    """Radius on which a plane turns, and waits [m]; of others None."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.system_id <= 254:
@@ -164,10 +169,15 @@ class VehicleConfig:
             "acceleration_m_s2",
             "jerk_m_s3",
             "airspeed_limit_m_s",
+            "circle_m",
         ):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:
                 raise ValueError(f"{name} must be positive and finite, not {value}")
+        if (self.circle_m is None) is not TRAITS[self.vehicle].stays:
+            raise ValueError(f"a {self.vehicle} has a circle only where it cannot stay")
+        if self.wind is not None and self.circle_m is not None:
+            raise ValueError(f"a {self.vehicle} is simulated in still air only")
         if not 0.0 <= self.charge_frac <= 1.0:
             raise ValueError(f"charge_frac must be within 0..1, not {self.charge_frac}")
         for name in ("spool_up_s", "touchdown_s", "swap_silence_s"):
@@ -187,6 +197,8 @@ class VehicleConfig:
 
     def motion(self) -> Motion:
         """How it moves from its start on."""
+        if self.circle_m is not None:
+            return CirclingMotion(self.start_enu_m, self.circle_m)
         motion: Motion = IdealMotion(self.start_enu_m)
         if self.acceleration_m_s2 is not None:
             kind = TurningMotion if self.rounds_corners else SmoothMotion
@@ -241,6 +253,13 @@ class Physics:
         return air if gusts is not None or air.speed_m_s > 0.0 else None
 
 
+def _acceleration_m_s2(uav: Uav, given_m_s2: float | None) -> float | None:
+    """Of its speed; that of a plane is one of its turns."""
+    if uav.turn_radius_m is not None:
+        return None
+    return uav.acceleration_m_s2 if given_m_s2 is None else given_m_s2
+
+
 def fleet_of(
     mission: Mission,
     uavs: Sequence[UavId] | None = None,
@@ -285,10 +304,12 @@ def fleet_of(
             swap_reboots=physics.swap_reboots,
             battery_failsafe=physics.battery_failsafe,
             position_failsafe_s=physics.position_failsafe_s,
-            acceleration_m_s2=uav.acceleration_m_s2 if given_m_s2 is None else given_m_s2,
+            acceleration_m_s2=_acceleration_m_s2(uav, given_m_s2),
             rounds_corners=not PLAIN_CONSTRAINTS.issuperset(mission.constraints),
             airspeed_limit_m_s=uav.airspeed_m_s,
             wind=physics.wind(mission, place),
+            vehicle=uav.vehicle,
+            circle_m=uav.turn_radius_m,
         )
         if mission.bases:
             config = replace(config, land_m_s=_LAND_M_S, descent_m_s=_DESCENT_M_S)

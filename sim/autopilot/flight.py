@@ -6,6 +6,7 @@ import math
 from enum import Enum
 
 from agent.vehicle.firmware.kinematics import JerkCost
+from sim.autopilot.circling_motion import CirclingMotion
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.parameters import ENDLESS, ParameterRole, ParameterTable
 from sim.world.motion import Motion, Point
@@ -15,6 +16,7 @@ class FlightMode(Enum):
     """What the vehicle flies by; the value is the name people see on ArduPilot."""
 
     MANUAL = "MANUAL"
+    HOLD = "HOLD"
     STABILIZE = "STABILIZE"
     ALT_HOLD = "ALT_HOLD"
     LOITER = "LOITER"
@@ -83,6 +85,8 @@ class FlightStateMachine:
         parameters: ParameterTable,
         motion: Motion,
         jerk_cost_s: JerkCost,
+        *,
+        drives: bool = False,
     ) -> None:
         self.activity = MotionPhase.GROUNDED
         self.home_enu_m: Point = config.start_enu_m
@@ -94,6 +98,8 @@ class FlightStateMachine:
         self._spool_up_s = config.spool_up_s
         self._takes_time = config.acceleration_m_s2 is not None
         self._jerk_cost_s = jerk_cost_s
+        self._on_wings = motion if isinstance(motion, CirclingMotion) else None
+        self._drives = drives
         self._touchdown_s = config.touchdown_s
         self._take_off_up_m = 0.0
         self._parameters = parameters
@@ -150,6 +156,10 @@ class FlightStateMachine:
         else:
             self.motion.stop(now_s)
 
+    def rouse(self) -> None:
+        """Be ready to drive: the motors run."""
+        self.activity = MotionPhase.HOLDING
+
     def take_off(self, up_m: float, now_s: float) -> None:
         """Rise straight to a height in the local frame [m], once the motors are up to it."""
         self._take_off_up_m = up_m
@@ -172,6 +182,9 @@ class FlightStateMachine:
         itself before it is there.
         """
         speed_m_s = self.cruise_m_s if speed_m_s is None else speed_m_s
+        if self._drives:
+            east_m, north_m, _ = target_enu_m
+            target_enu_m = east_m, north_m, self.ground_up_m(east_m, north_m)
         self._leave(MotionPhase.NAVIGATING, target_enu_m, speed_m_s, now_s)
         self._near_m = near_m
         self._near_s = self._is_near_s(now_s)
@@ -211,14 +224,20 @@ class FlightStateMachine:
         """Drop, because the motors stand still."""
         if self.on_ground or self.activity is MotionPhase.TOUCHED_DOWN:
             self.hold(now_s)
+        elif self._drives:
+            self.hold(now_s)
+            self.activity = MotionPhase.GROUNDED
         else:
             self._descend(MotionPhase.FALLING, _FALL_M_S, now_s)
 
     def return_home(self, now_s: float) -> None:
-        """Rise to the return height if below it, fly home, wait, land."""
+        """Rise to the return height if below it, fly home, wait, land; or drive there, and stay."""
         if self.on_ground:
             self.hold(now_s)
         if self.activity in (MotionPhase.GROUNDED, MotionPhase.TOUCHED_DOWN):
+            return
+        if self._drives:
+            self._leave(MotionPhase.RETURNING, self.home_enu_m, self.cruise_m_s, now_s)
             return
         east_m, north_m, up_m = self._stopped_enu_m(now_s)
         return_up_m = self.home_enu_m[2] + self._parameters.value_si(ParameterRole.RETURN_HEIGHT_M)
@@ -245,12 +264,16 @@ class FlightStateMachine:
                 self._near_s = None
                 return Milestone.REACHED
             case MotionPhase.NAVIGATING:
-                self.hold(at_s)
+                if self._on_wings is None:
+                    self.hold(at_s)
+                self.activity = MotionPhase.HOLDING
                 return Milestone.REACHED
             case MotionPhase.CLIMBING:
                 _, _, up_m = self.motion.target_enu_m
                 above_home_enu_m = (*self.home_enu_m[:2], up_m)
                 self._leave(MotionPhase.RETURNING, above_home_enu_m, self.cruise_m_s, at_s)
+            case MotionPhase.RETURNING if self._drives:
+                self.hold(at_s)
             case MotionPhase.RETURNING:
                 self.hold(at_s)
                 self.activity = MotionPhase.WAITING
@@ -316,6 +339,8 @@ class FlightStateMachine:
             self.motion.limit(self._acceleration_m_s2(speed_m_s))
         if self.activity in self._hindered:
             self.motion.stop(now_s)
+        elif self._on_wings is not None and self.activity is MotionPhase.NAVIGATING:
+            self._on_wings.circle(target_enu_m, speed_m_s, now_s)
         else:
             self.motion.fly_to(target_enu_m, speed_m_s, now_s)
 

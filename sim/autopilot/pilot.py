@@ -61,7 +61,9 @@ class Pilot:
         self.narrator = Narrator(outbox, flavour, config.system_id)
         self.readiness = Readiness(config.delays, boot_s)
         motion = config.motion()
-        self.flight = FlightStateMachine(config, self.parameters, motion, flavour.jerk_cost_s)
+        self.flight = FlightStateMachine(
+            config, self.parameters, motion, flavour.jerk_cost_s, drives=flavour.drives
+        )
         self.store = store
         self.run = MissionRun(self)
         self.mode = flavour.modes.at_boot
@@ -306,7 +308,12 @@ class Pilot:
         self._ground_contact.armed(now_s)
         if not self.config.drains_in_flight:
             self.battery.start(now_s)
-        self._disarm_unused(now_s)
+        if self.flavour.drives:
+            self._flew = True
+            self.battery.start(now_s)
+            self.flight.rouse()
+        else:
+            self._disarm_unused(now_s)
         if self.flavour.tells_origin_when_armed:
             self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(now_s)))
         if not self._home_locked:
@@ -338,7 +345,7 @@ class Pilot:
         """Stop the motors; False in the air, unless forced."""
         if not self.armed:
             return True
-        if not forced and not self.flight.on_ground:
+        if not (forced or self.flight.on_ground or self.flavour.drives):
             self.narrator.tell(FirmwareEvent.DISARMING_REFUSED)
             return False
         self._disarm(now_s, FirmwareEvent.DISARMED)

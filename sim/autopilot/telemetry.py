@@ -135,7 +135,7 @@ class TelemetryReporter:
         del now_s
         pilot = self._pilot
         return mavlink.MAVLink_heartbeat_message(
-            mavlink.MAV_TYPE_QUADROTOR,
+            pilot.flavour.vehicle_type,
             pilot.flavour.autopilot,
             pilot.flavour.base_mode(pilot),
             pilot.flavour.custom_mode(pilot.mode),
@@ -313,10 +313,11 @@ class TelemetryReporter:
 
     def _extended_state(self, now_s: float) -> mavlink.MAVLink_message:
         del now_s
-        return mavlink.MAVLink_extended_sys_state_message(
-            self._pilot.flavour.vtol_state,
-            _LANDED_STATES.get(self._pilot.flight.activity, mavlink.MAV_LANDED_STATE_IN_AIR),
-        )
+        flavour, activity = self._pilot.flavour, self._pilot.flight.activity
+        landed = _LANDED_STATES.get(activity, mavlink.MAV_LANDED_STATE_IN_AIR)
+        if flavour.drives:
+            landed = mavlink.MAV_LANDED_STATE_UNDEFINED
+        return mavlink.MAVLink_extended_sys_state_message(flavour.vtol_state, landed)
 
     def _origin(self, now_s: float) -> mavlink.MAVLink_message:
         return origin_position(self._pilot.config.origin, self._boot_us(now_s))

@@ -92,7 +92,9 @@ class BridgedVehicle:
         make_bridge: Callable[[BridgeConfig], SteppedBridge] = Bridge,
     ) -> None:
         start_s = queue.now_s()
-        vehicle = SimulatedAutopilot(equipment.vehicle, firmware_model(equipment.flavour), start_s)
+        vehicle = SimulatedAutopilot(
+            equipment.vehicle, firmware_model(equipment.flavour, equipment.vehicle.vehicle), start_s
+        )
         self._machine = FaultyAutopilot(vehicle, equipment.faults, start_s)
         self._queue = queue
         self._report = report

@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Mapping
 from enum import StrEnum
-from typing import TYPE_CHECKING
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Final
+
+from swarm.model.vehicles import VehicleKind
+from swarm.runtime.errors import Fault, InputError
 
 if TYPE_CHECKING:
     from sim.autopilot.firmware.model import FirmwareModel
 
-__all__ = ["FirmwareModelName", "firmware_model"]
+__all__ = ["SIMULATED", "FirmwareModelName", "check_simulated", "firmware_model"]
 
 
 class FirmwareModelName(StrEnum):
@@ -18,10 +23,48 @@ class FirmwareModelName(StrEnum):
     PX4 = "px4"
 
 
-def firmware_model(name: FirmwareModelName) -> FirmwareModel:
-    """The firmware of that name, in its newest version."""
+SIMULATED: Final[Mapping[FirmwareModelName, frozenset[VehicleKind]]] = MappingProxyType(
+    {
+        FirmwareModelName.ARDUPILOT: frozenset(VehicleKind),
+        FirmwareModelName.PX4: frozenset({VehicleKind.COPTER}),
+    }
+)
+"""Which kinds of vehicles there are of each."""
+
+
+def check_simulated(
+    name: FirmwareModelName, vehicles: Collection[VehicleKind], source: str
+) -> None:
+    """Refuse vehicles of which there are none of that firmware; ``source`` asks for it.
+
+    Raises:
+        InputError: there is one.
+    """
+    for vehicle in vehicles:
+        if vehicle not in SIMULATED[name]:
+            problem = f"no {vehicle} is simulated with that firmware"
+            remedy = f"take {FirmwareModelName.ARDUPILOT}'s, or make it a copter"
+            raise InputError(Fault(source, name, problem, remedy))
+
+
+def firmware_model(
+    name: FirmwareModelName, vehicle: VehicleKind = VehicleKind.COPTER
+) -> FirmwareModel:
+    """The firmware of that name for that kind of vehicle, in its newest version.
+
+    Raises:
+        ValueError: there is none of that kind.
+    """
+    if vehicle not in SIMULATED[name]:
+        raise ValueError(f"no {vehicle} is simulated with {name}")
     # Imported late: the command line knows the names without the dialect.
     from sim.autopilot.firmware.ardupilot import ArduCopterModel
+    from sim.autopilot.firmware.ardurover import ArduRoverModel
     from sim.autopilot.firmware.px4 import Px4Model
+    from sim.autopilot.firmware.quadplane import QuadPlaneModel
 
+    if vehicle is VehicleKind.ROVER:
+        return ArduRoverModel()
+    if vehicle is VehicleKind.QUADPLANE:
+        return QuadPlaneModel()
     return Px4Model() if name == FirmwareModelName.PX4 else ArduCopterModel()

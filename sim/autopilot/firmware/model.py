@@ -190,8 +190,12 @@ class FirmwareModel(ABC):
     """MAV_AUTOPILOT."""
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY."""
+    vehicle_type: int = mavlink.MAV_TYPE_QUADROTOR
+    drives: bool = False
+    """Whether it stays on the ground: it is under way as soon as its motors run, takes neither off
+    nor lands, and has no words for that (EXTENDED_SYS_STATE)."""
     vtol_state: int
-    """MAV_VTOL_STATE of a multicopter."""
+    """MAV_VTOL_STATE."""
     version: int
     """``flight_sw_version`` of AUTOPILOT_VERSION."""
     modes: ModeBehaviour
