@@ -29,6 +29,7 @@ from sim.fleet.layout import BusKind, LaunchOptions, defaults_for
 from sim.fleet.passthrough import PassthroughOptions, fence_around
 from sim.fleet.run import fly
 from swarm.model import Mission
+from swarm.model.mission import kinds_of
 from swarm.runtime.table import Column
 
 SIMULATED: Final = ("sim", "sim-px4")
@@ -236,7 +237,7 @@ def _options(
 ) -> LaunchOptions:
     """As `swarm run` flies it, with nobody beside the vehicles."""
     uavs = [uav.id for uav in mission.uavs]
-    autopilots = parse_autopilots(way.autopilot, uavs, None, environment)
+    autopilots = parse_autopilots(way.autopilot, uavs, None, environment, kinds_of(mission))
     options = launch_options(
         scenario,
         len(uavs),

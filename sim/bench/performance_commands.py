@@ -92,13 +92,14 @@ def turnaround(
     from sim.fleet.firmware import SitlFirmware
     from sim.fleet.layout import BusKind
     from sim.fleet.passthrough import PassthroughOptions, parse_command_styles
+    from swarm.model.mission import kinds_of
     from swarm.scenario import load_scenario, require_plain
 
     path = scenario or resolve_scenario("valley-survey")
     mission = load_scenario(path)
     require_plain(mission, "swarm bench")
     uavs = [uav.id for uav in mission.uavs]
-    autopilots = parse_autopilots(autopilot, uavs, None, os.environ)
+    autopilots = parse_autopilots(autopilot, uavs, None, os.environ, kinds_of(mission))
     options = launch_options(
         path,
         len(uavs),

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from agent.vehicle.config import parse_link
-from sim.autopilot.firmware import FirmwareModelName
+from agent.vehicle.config import CommandStyle, parse_link
+from sim.autopilot.firmware import FirmwareModelName, check_simulated
 from sim.fleet.firmware import FirmwareKind, SitlFirmware, find_firmware
+from swarm.model import Mission
+from swarm.model.vehicles import VehicleKind
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
 _SOURCE = "--autopilot"
@@ -47,13 +49,18 @@ Autopilots = SimulatedAutopilots | SitlFirmware | RunningVehicles
 
 
 def parse_autopilots(
-    text: str, uavs: Sequence[str], firmware: Path | None, environment: Mapping[str, str]
+    text: str,
+    uavs: Sequence[str],
+    firmware: Path | None,
+    environment: Mapping[str, str],
+    vehicles: Collection[VehicleKind] = (VehicleKind.COPTER,),
 ) -> Autopilots:
     """What ``--autopilot`` asks for.
 
     URLs stand for the UAVs in the order of the scenario, or for one by name (``uav2=URL``). The
     system id is the UAV's place in the scenario, unless the URL ends in ``#ID``. ``firmware`` is
-    the value of ``--firmware``; ``environment`` may say where firmware is, too.
+    the value of ``--firmware``; ``environment`` may say where firmware is, too. ``vehicles`` are
+    the kinds that the scenario has.
 
     Raises:
         InputError: it makes no sense, or what it names is not there.
@@ -64,15 +71,28 @@ def parse_autopilots(
             Fault("--firmware", str(firmware), f"does not go with --autopilot {text}", _REMEDY)
         )
     match kind:
-        case "sim":
-            return SimulatedAutopilots()
-        case "sim-px4":
-            return SimulatedAutopilots(FirmwareModelName.PX4)
+        case "sim" | "sim-px4":
+            flavour = FirmwareModelName.ARDUPILOT if kind == "sim" else FirmwareModelName.PX4
+            check_simulated(flavour, vehicles, _SOURCE)
+            return SimulatedAutopilots(flavour)
         case "ardupilot" | "px4":
-            return find_firmware(FirmwareKind(kind), len(uavs), firmware, environment)
+            return find_firmware(FirmwareKind(kind), len(uavs), firmware, environment, vehicles)
     if ":" not in kind:
         raise InputError(Fault(_SOURCE, text, "no such autopilot", _REMEDY))
     return RunningVehicles(_places(kind, uavs))
+
+
+def check_commanded(mission: Mission, command: Mapping[str, CommandStyle]) -> None:
+    """Refuse to command by missions what is not commanded so.
+
+    Raises:
+        InputError: a UAV that is no copter is to be commanded by missions.
+    """
+    for uav in mission.uavs:
+        if uav.vehicle is VehicleKind.COPTER or command.get(uav.id) is not CommandStyle.MISSION:
+            continue
+        problem = f"{uav.id} is a {uav.vehicle}, which is not commanded by missions"
+        raise InputError(Fault("--command", CommandStyle.MISSION, problem, "give reposition"))
 
 
 def check_speedup(autopilots: Autopilots, speedup: float) -> None:

@@ -278,6 +278,7 @@ def run(
     from sim.fleet.autopilots import (
         RunningVehicles,
         SimulatedAutopilots,
+        check_commanded,
         check_speedup,
         parse_autopilots,
     )
@@ -290,6 +291,7 @@ def run(
         parse_command_styles,
     )
     from sim.fleet.shown_run import Outputs, ShownRun
+    from swarm.model.mission import kinds_of
     from swarm.protocol.timing import preset
     from swarm.runtime.log import LogFormat, LogLevel, configure_logging
     from swarm.scenario import load_scenario
@@ -297,7 +299,7 @@ def run(
     check_flight(method, report, record)
     mission = load_scenario(scenario)
     uavs = [uav.id for uav in mission.uavs]
-    autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ)
+    autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ, kinds_of(mission))
     check_speedup(autopilots, speedup)
     if isinstance(autopilots, SimulatedAutopilots) and not any_size:
         _check_size(scenario, len(uavs))
@@ -315,6 +317,7 @@ def run(
         ready_by_itself=not isinstance(autopilots, RunningVehicles),
         faults=tuple(fault or ()),
     )
+    check_commanded(mission, passthrough.command)
     check_passthrough(passthrough, autopilots, uavs)
     defaults = defaults_for(autopilots, len(uavs))
     plain = LaunchOptions(

@@ -1,9 +1,9 @@
 """How real firmware is started in software-in-the-loop: a pure description, one process a UAV.
 
-ArduCopter is one binary: its options name model, instance, home place, speed-up and system id, its
-parameters come from a file, and instance n waits for its agent at TCP port 5760 + 10 n; a ground
-station may connect to the port two above. It goes on booting once the agent is there (ArduPilot,
-``libraries/AP_HAL_SITL/SITL_cmdline.cpp`` and ``Tools/autotest/default_params/copter.parm``;
+ArduPilot has a binary for each kind of vehicle: its options name model, instance, home place,
+speed-up and system id, its parameters come from a file, and instance n waits for its agent at TCP
+port 5760 + 10 n; a ground station may connect to the port two above. It goes on booting once the
+agent is there (ArduPilot, ``libraries/AP_HAL_SITL/SITL_cmdline.cpp``;
 https://ardupilot.org/dev/docs/sitl-serial-mapping.html). PX4 is a build folder with ``bin/px4``
 and ``etc``: everything but the instance is said by environment variables, the vehicle is the
 quadrotor of its own simulator, which needs no other program, instance n has system id n + 1 and
@@ -22,14 +22,16 @@ from __future__ import annotations
 import os
 import re
 import tempfile
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
-from swarm.model import Mission
+from sim.fleet.ardupilot_vehicles import ARDUPILOT_VEHICLES
+from swarm.model import Mission, Uav
 from swarm.model.frames import DEFAULT_ORIGIN, wgs84_from_enu
+from swarm.model.vehicles import VehicleKind
 from swarm.runtime.errors import Fault, InputError
 
 _ARDUCOPTER_PORT: Final = 5760
@@ -57,41 +59,7 @@ that again and again."""
 _HEADING_DEG: Final = 0.0
 
 
-ARDUCOPTER_PARAMETERS: Final = {
-    # A quadrotor in "+" order, as the model is.
-    "FRAME_CLASS": 1,
-    "FRAME_TYPE": 0,
-    # What calibration of sensors and radio would have left; arming is refused without.
-    **{
-        f"INS_{sensor}{kind}_{axis}": value
-        for sensor in ("ACC", "ACC2")
-        for kind, value in (("OFFS", 0.001), ("SCAL", 1.001))
-        for axis in "XYZ"
-    },
-    **{
-        f"COMPASS_OFS{compass}_{axis}": value
-        for compass in ("", "2", "3")
-        for axis, value in (("X", 5), ("Y", 13), ("Z", -18))
-    },
-    **{f"RC{channel}_MIN": 1000 for channel in range(1, 9)},
-    **{f"RC{channel}_MAX": 2000 for channel in range(1, 9)},
-    **{f"RC{channel}_TRIM": 1500 for channel in range(1, 9)},
-    "FS_THR_ENABLE": 1,
-    # The model's battery and motors.
-    "BATT_MONITOR": 4,
-    # 3300 mAh unless told otherwise, which reach the agents' reserve of 20 % in six minutes;
-    # the model's voltage does not sag, as SIM_BATT_CAP_AH is 0.
-    "BATT_CAPACITY": 33_000,
-    "MOT_THST_EXPO": 0.65,
-    "MOT_THST_HOVER": 0.39,
-    "MOT_BAT_VOLT_MIN": 9.6,
-    "MOT_BAT_VOLT_MAX": 12.8,
-    "ATC_RAT_YAW_P": 0.09,
-    "ATC_RAT_YAW_I": 0.009,
-}
-"""What ArduPilot's own tests give the model; see ``copter.parm`` there."""
-
-_ARDUCOPTER_FILE: Final = "copter.parm"
+_PARAMETER_FILE: Final = "vehicle.parm"
 
 
 class FirmwareKind(StrEnum):
@@ -139,35 +107,45 @@ class SitlFirmware:
 
     kind: FirmwareKind
     program: Path
-    """Absolute path of the binary."""
+    """Absolute path of the binary; of ArduPilot's that of copters, where there are any."""
     workplace: Path
     """Where its instances get folders of their own."""
+    others: Mapping[VehicleKind, Path] = field(default_factory=dict)
+    """Binaries of ArduPilot's other vehicles."""
 
     def processes(self, mission: Mission, speedup: float) -> dict[str, FirmwareProcess]:
         """Processes by UAV, each vehicle standing at its UAV's start."""
         origin = mission.origin or DEFAULT_ORIGIN
-        make = self._arducopter if self.kind is FirmwareKind.ARDUPILOT else self._px4
-        return {
-            uav.id: make(number, wgs84_from_enu(origin, uav.position_enu_m), speedup)
-            for number, uav in enumerate(mission.uavs)
-        }
+        made: dict[str, FirmwareProcess] = {}
+        for number, uav in enumerate(mission.uavs):
+            home = wgs84_from_enu(origin, uav.position_enu_m)
+            if self.kind is FirmwareKind.ARDUPILOT:
+                made[uav.id] = self._ardupilot(number, home, speedup, uav)
+            else:
+                made[uav.id] = self._px4(number, home, speedup)
+        return made
 
-    def _arducopter(
-        self, number: int, home: tuple[float, float, float], speedup: float
+    def _ardupilot(
+        self, number: int, home: tuple[float, float, float], speedup: float, uav: Uav
     ) -> FirmwareProcess:
+        vehicle = ARDUPILOT_VEHICLES[uav.vehicle]
+        program = self.others.get(uav.vehicle, self.program)
         lat_deg, lon_deg, alt_m = home
         port = _ARDUCOPTER_PORT + _ARDUCOPTER_PORTS_EACH * number
         command = (
-            *(str(self.program), "--model", "+"),
+            *(str(program), "--model", vehicle.model),
             *("--speedup", f"{speedup:g}"),
             *("--home", f"{lat_deg:.7f},{lon_deg:.7f},{alt_m:.2f},{_HEADING_DEG:g}"),
-            *("--defaults", _ARDUCOPTER_FILE),
+            *("--defaults", _PARAMETER_FILE),
             *("--instance", str(number)),
             *("--sysid", str(number + 1)),
         )
-        parameters = "".join(f"{name} {value}\n" for name, value in ARDUCOPTER_PARAMETERS.items())
+        values: dict[str, float] = {**vehicle.parameters}
+        if uav.turn_radius_m is not None:
+            values["WP_LOITER_RAD"] = round(uav.turn_radius_m)
+        parameters = "".join(f"{name} {value}\n" for name, value in values.items())
         url = f"tcp:127.0.0.1:{port}"
-        files = {_ARDUCOPTER_FILE: parameters}
+        files = {_PARAMETER_FILE: parameters}
         return FirmwareProcess(command, self._folder(number), {}, files, url, number + 1)
 
     def _px4(
@@ -195,16 +173,23 @@ class SitlFirmware:
 
 
 def find_firmware(
-    kind: FirmwareKind, n_uav: int, path: Path | None, environment: Mapping[str, str]
+    kind: FirmwareKind,
+    n_uav: int,
+    path: Path | None,
+    environment: Mapping[str, str],
+    vehicles: Collection[VehicleKind] = (VehicleKind.COPTER,),
 ) -> SitlFirmware:
-    """The firmware of that kind on this machine, for ``n_uav`` instances.
+    """The firmware of that kind on this machine, for ``n_uav`` instances of ``vehicles``.
 
     ``path`` is that of ArduCopter's binary, or of a build folder of PX4; without one a variable of
-    ``environment`` says where it is.
+    ``environment`` says where it is, as it does of other vehicles' binaries.
 
     Raises:
         InputError: it is not there, cannot serve so many, or has no place to work in.
     """
+    others = _find_others(kind, n_uav, environment, vehicles)
+    if others and VehicleKind.COPTER not in vehicles:
+        return SitlFirmware(kind, next(iter(others.values())), firmware_workplace(), others)
     source = "--firmware" if path is not None else kind.variable
     what, example = (
         ("ArduPilot's binary", "~/ardupilot/build/sitl/bin/arducopter")
@@ -231,7 +216,37 @@ def find_firmware(
     if n_uav > kind.most:
         problem = f"{n_uav} UAVs, but at most {kind.most} such vehicles run on one machine"
         raise InputError(Fault("--autopilot", kind, problem, "fly a smaller scenario"))
-    return SitlFirmware(kind, program, firmware_workplace())
+    return SitlFirmware(kind, program, firmware_workplace(), others)
+
+
+def _find_others(
+    kind: FirmwareKind,
+    n_uav: int,
+    environment: Mapping[str, str],
+    vehicles: Collection[VehicleKind],
+) -> dict[VehicleKind, Path]:
+    """Binaries of what is no copter, by kind."""
+    found: dict[VehicleKind, Path] = {}
+    for vehicle in dict.fromkeys(vehicles):
+        if vehicle is VehicleKind.COPTER:
+            continue
+        if kind is FirmwareKind.PX4:
+            problem = f"a {vehicle} is not flown with PX4"
+            raise InputError(Fault("--autopilot", kind, problem, "fly it with ardupilot"))
+        if n_uav > kind.most:
+            problem = f"{n_uav} UAVs, but at most {kind.most} such vehicles run on one machine"
+            raise InputError(Fault("--autopilot", kind, problem, "fly a smaller scenario"))
+        known = ARDUPILOT_VEHICLES[vehicle]
+        text = environment.get(known.variable, "")
+        place = Path(text).expanduser().absolute()
+        if not (text and place.is_file() and os.access(place, os.X_OK)):
+            problem = f"there is no program {place}" if text else "no firmware is known"
+            remedy = (
+                f"give the path of the binary, such as ~/ardupilot/build/sitl/bin/{known.program}"
+            )
+            raise InputError(Fault(known.variable, text or f"a {vehicle}", problem, remedy))
+        found[vehicle] = place
+    return found
 
 
 _PLAIN: Final = re.compile(r"[A-Za-z0-9_./+-]+")

@@ -14,7 +14,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.vehicle.codec import MavlinkCodec
-from agent.vehicle.firmware import firmware_of
+from agent.vehicle.firmware import firmware_of, unsupported
 from agent.vehicle.firmware.kinematics import Kinematics
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.flight_limits import LimitsReading
@@ -183,13 +183,11 @@ class VehicleListener:
             return [self._not_heard(name)]
         flavour = firmware_of(heartbeat)
         if flavour is None:
-            text = (
-                f"autopilot {heartbeat.autopilot} on vehicle type {heartbeat.vehicle_type} "
-                "(MAV_AUTOPILOT, MAV_TYPE)"
-            )
-            return [fails(name, text, "fly ArduCopter or PX4 on a multicopter")]
+            remedy = "fly ArduCopter, Rover, a QuadPlane, or PX4 on a multicopter"
+            return [fails(name, unsupported(heartbeat), remedy)]
         return [
             self._vehicle(name, heartbeat, flavour),
+            *_kind(name, flavour),
             self._readiness(name, flavour),
             *([] if self._failsafes is None else [_failsafes(name, self._failsafes)]),
             *([] if self._limits is None else [_limits(name, self._limits.kinematics)]),
@@ -303,6 +301,12 @@ def _failsafes(name: str, reading: FailsafeReading) -> CheckFinding:
     return fine(what, text)
 
 
+def _kind(name: str, flavour: Firmware) -> list[CheckFinding]:
+    """What it is, and what it is not flown with; nothing of a copter."""
+    limits = flavour.traits.limits
+    return [fine(f"{name} kind", f"a {flavour.kind}: {limits}")] if limits else []
+
+
 def _limits(name: str, limits: Kinematics) -> CheckFinding:
     """How it flies its legs."""
     what = f"{name} legs"
@@ -314,6 +318,8 @@ def _limits(name: str, limits: Kinematics) -> CheckFinding:
         acceleration, legs_m_s2 = limits.acceleration, limits.leg_acceleration_m_s2(_SHOWN_M_S)
         parts.append(f"{acceleration.name} {acceleration.value:.3g} m/s²")
         parts.append(f"with its jerk as long as {legs_m_s2:.3g} m/s² at {_SHOWN_M_S:g} m/s")
+    if limits.circle is not None:
+        parts.append(f"{limits.circle.name} {limits.circle.value:.3g} m")
     if limits.speed is not None:
         parts.append(f"{limits.speed.name} {limits.speed.value:.3g} m/s")
     if not parts:
