@@ -27,6 +27,7 @@ from agent.vehicle.messages import (
 from agent.vehicle.parameter_reading import PAUSE_TIMEOUTS, TRIES, ParameterReading
 from agent.vehicle.session import VehicleSession
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
+from swarm.model.vehicles import TRAITS
 from swarm.protocol.fields import Point
 
 _SIMULATED = "SWARM_SIMULATED"
@@ -252,13 +253,8 @@ def aim(order: Prepare, place_enu_m: Point, position: Position) -> Prepare:
     return replace(order, position_enu_m=(*place_enu_m[:2], up_m), ground_up_m=None)
 
 
-def start_fault(
-    order: Prepare, position: Position, config: BridgeConfig, *, drives: bool = False
-) -> str | None:
-    """Why the start cannot be reached from where the vehicle stands; None if it can.
-
-    One that ``drives`` does not climb there.
-    """
+def start_fault(order: Prepare, position: Position, config: BridgeConfig) -> str | None:
+    """Why the start cannot be reached from where the vehicle stands; None if it can."""
     east_m, north_m, _ = enu_from_wgs84(
         config.origin, position.lat_deg, position.lon_deg, position.alt_m
     )
@@ -275,7 +271,7 @@ def start_fault(
                 f"home is at {home_m:.0f} m above sea level, the scenario says "
                 f"{ground_alt_m:.0f} m there: correct [origin] alt_m, or position_m"
             )
-    if drives:
+    if TRAITS[order.vehicle].drives:
         return None
     _, _, start_alt_m = wgs84_from_enu(config.origin, order.position_enu_m)
     height_m = start_alt_m - home_m

@@ -7,11 +7,10 @@ No script: every time something is heard, the next step follows from the state *
 so an overwritten mode, an automatic disarming on the ground or a vehicle that flies
 already need no cases of their own. A vehicle that somebody else armed or flies is waited
 for, and once it is disarmed it does not start by itself. Every step has a limit. A vehicle
-that is resumed in the air keeps its old target meanwhile: only its speed is set, and not
-even that if it flies a mission of ours. Commanded by missions, it gets one that ends at home
-while it stands on the ground, and is not ready before it flies it. What counts as consent to fly
-a vehicle stands in agent.vehicle.supervision, and what it is asked beforehand in
-agent.vehicle.preflight.
+that is resumed in the air keeps its old target meanwhile: only its speed is set, and not even that
+if it flies a mission of ours. Commanded by missions, it gets one that ends at home while it stands
+on the ground, and is not ready before it flies it. What counts as consent to fly a vehicle stands
+in agent.vehicle.supervision, and what it is asked beforehand in agent.vehicle.preflight.
 """
 
 from __future__ import annotations
@@ -46,8 +45,7 @@ _CLIMB_TOLERANCE_FRAC = 0.05
 _CLIMB_TOLERANCE_M = 1.0
 """Autopilots end a takeoff that much too low, and go on from there."""
 _CAME_DOWN = (
-    "it was left in the air and stands on the ground now: look after it, "
-    "and start its agent with --rejoin"
+    "it was left in the air and stands on the ground now: look after it, start it with --rejoin"
 )
 _NO_PLACE = "waiting for a position"
 _NOT_ITS_TURN = "waiting for its turn to take off"
@@ -185,11 +183,8 @@ class _Preparation:
             self.waiting_for = _NO_PLACE
         elif (airborne := firmware.airborne(vehicle)) is None:
             self.waiting_for = "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
-        elif objection := self._consent.objection(
-            # Whoever armed one that drives may stand beside it.
-            airborne=airborne and not firmware.traits.drives
-        ):
-            self._flown_by_pilot |= airborne and not firmware.traits.drives
+        elif objection := self._consent.objection(airborne=airborne):
+            self._flown_by_pilot |= airborne
             self._armed_by_others = True
             self.waiting_for = objection
         elif airborne:
@@ -260,9 +255,7 @@ class _Preparation:
         if objection := self._session.arming_objection():
             return self._wait(objection)
         place = vehicle.position
-        drives = self._firmware.traits.drives
-        fault = place and start_fault(self._order, place, self._config, drives=drives)
-        if fault:
+        if place is not None and (fault := start_fault(self._order, place, self._config)):
             return self._fail(fault)
         if objection := self._failsafes.objection:
             return self._wait(objection)
@@ -273,8 +266,7 @@ class _Preparation:
         if self._session.awaits_turn:
             return self._wait(_NOT_ITS_TURN)
         self._consent.arm()
-        if drives:
-            self._session.launched_enu_m = self._session.known_place_m()
+        self._session.launched_enu_m = self._session.known_place_m()
         return self._ask(self._arm, self._firmware.arm())
 
     def _start_alt_m(self) -> float:
@@ -494,8 +486,7 @@ class Preparing(Activity):
     def advance(self) -> None:
         """Do what the state seen asks for next, and say what is waited for."""
         session, heartbeat = self._session, self._session.vehicle.heartbeat
-        reason = session.missing() or wrong_kind(self.order, session.firmware)
-        if reason is not None:
+        if reason := session.missing() or wrong_kind(self.order, session.firmware):
             session.tell_not_ready(reason)
             return
         if heartbeat is None or session.firmware is None:

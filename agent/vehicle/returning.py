@@ -170,7 +170,7 @@ class Returning(Activity):
         else:
             session.say(*out)
 
-    def _disarm_at_rest(self) -> tuple[Outbound, ...]:
+    def _disarm_at_rest(self) -> Sequence[Outbound]:
         """What stops the motors of a vehicle that has come home and leaves them on."""
         session, still_since_s = self._session, self._still_since_s
         home_enu_m, place_enu_m = session.launched_enu_m, session.known_place_m()

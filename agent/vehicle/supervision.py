@@ -106,9 +106,11 @@ class PilotConsent:
 
     def objection(self, *, airborne: bool) -> str | None:
         """Why the armed vehicle is to be left alone, in words; None if it may be commanded."""
-        if not self.needed or (airborne and self._given):
+        # Whoever armed one that drives may stand beside it.
+        stands = self._firmware.traits.drives or not airborne
+        if not self.needed or (self._given and not stands):
             return None
-        if not airborne:
+        if stands:
             return "armed by somebody else: disarm it"
         mode = self._firmware.commanded_mode_name
         return f"flown by its pilot: land it, or switch it to {mode} from another mode"

@@ -159,10 +159,16 @@ class CirclingMotion(IdealMotion):
         up_m_s = math.copysign(_CLIMB_M_S, whole_m) if rises else 0.0
         return self._speed_m_s * east, self._speed_m_s * north, up_m_s
 
-    def fly_to(self, target_enu_m: Point, speed_m_s: float, now_s: float) -> None:
+    def fly_to(
+        self,
+        target_enu_m: Point,
+        speed_m_s: float,
+        now_s: float,
+        acceleration_m_s2: float | None = None,
+    ) -> None:
         """Straight there, on rotors."""
         self.stop(now_s)
-        super().fly_to(target_enu_m, speed_m_s, now_s)
+        super().fly_to(target_enu_m, speed_m_s, now_s, acceleration_m_s2)
 
     def stop(self, now_s: float) -> None:
         """Hover where it is."""

@@ -208,7 +208,7 @@ class CommandExecutor:
 
     def _take_off(self, command: AutopilotCommand, now_s: float) -> int:
         pilot = self._pilot
-        if pilot.flavour.drives:
+        if pilot.flight.drives:
             return _UNSUPPORTED
         up_m: float | None = None
         if pilot.flavour.take_off_above_home:

@@ -10,6 +10,7 @@ from sim.autopilot.circling_motion import CirclingMotion
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.parameters import ENDLESS, ParameterRole, ParameterTable
 from sim.world.motion import Motion, Point
+from swarm.model.vehicles import TRAITS
 
 
 class FlightMode(Enum):
@@ -85,8 +86,6 @@ class FlightStateMachine:
         parameters: ParameterTable,
         motion: Motion,
         jerk_cost_s: JerkCost,
-        *,
-        drives: bool = False,
     ) -> None:
         self.activity = MotionPhase.GROUNDED
         self.home_enu_m: Point = config.start_enu_m
@@ -99,7 +98,8 @@ class FlightStateMachine:
         self._takes_time = config.acceleration_m_s2 is not None
         self._jerk_cost_s = jerk_cost_s
         self._on_wings = motion if isinstance(motion, CirclingMotion) else None
-        self._drives = drives
+        self.drives = TRAITS[config.vehicle].drives
+        """It stays on the ground."""
         self._touchdown_s = config.touchdown_s
         self._take_off_up_m = 0.0
         self._parameters = parameters
@@ -156,9 +156,11 @@ class FlightStateMachine:
         else:
             self.motion.stop(now_s)
 
-    def rouse(self) -> None:
-        """Be ready to drive: the motors run."""
-        self.activity = MotionPhase.HOLDING
+    def rouse(self) -> bool:
+        """The motors run; whether it is under way by that, as it drives."""
+        if self.drives:
+            self.activity = MotionPhase.HOLDING
+        return self.drives
 
     def take_off(self, up_m: float, now_s: float) -> None:
         """Rise straight to a height in the local frame [m], once the motors are up to it."""
@@ -182,7 +184,7 @@ class FlightStateMachine:
         itself before it is there.
         """
         speed_m_s = self.cruise_m_s if speed_m_s is None else speed_m_s
-        if self._drives:
+        if self.drives:
             east_m, north_m, _ = target_enu_m
             target_enu_m = east_m, north_m, self.ground_up_m(east_m, north_m)
         self._leave(MotionPhase.NAVIGATING, target_enu_m, speed_m_s, now_s)
@@ -224,7 +226,7 @@ class FlightStateMachine:
         """Drop, because the motors stand still."""
         if self.on_ground or self.activity is MotionPhase.TOUCHED_DOWN:
             self.hold(now_s)
-        elif self._drives:
+        elif self.drives:
             self.hold(now_s)
             self.activity = MotionPhase.GROUNDED
         else:
@@ -236,7 +238,7 @@ class FlightStateMachine:
             self.hold(now_s)
         if self.activity in (MotionPhase.GROUNDED, MotionPhase.TOUCHED_DOWN):
             return
-        if self._drives:
+        if self.drives:
             self._leave(MotionPhase.RETURNING, self.home_enu_m, self.cruise_m_s, now_s)
             return
         east_m, north_m, up_m = self._stopped_enu_m(now_s)
@@ -272,7 +274,7 @@ class FlightStateMachine:
                 _, _, up_m = self.motion.target_enu_m
                 above_home_enu_m = (*self.home_enu_m[:2], up_m)
                 self._leave(MotionPhase.RETURNING, above_home_enu_m, self.cruise_m_s, at_s)
-            case MotionPhase.RETURNING if self._drives:
+            case MotionPhase.RETURNING if self.drives:
                 self.hold(at_s)
             case MotionPhase.RETURNING:
                 self.hold(at_s)

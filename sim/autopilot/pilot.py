@@ -61,9 +61,7 @@ class Pilot:
         self.narrator = Narrator(outbox, flavour, config.system_id)
         self.readiness = Readiness(config.delays, boot_s)
         motion = config.motion()
-        self.flight = FlightStateMachine(
-            config, self.parameters, motion, flavour.jerk_cost_s, drives=flavour.drives
-        )
+        self.flight = FlightStateMachine(config, self.parameters, motion, flavour.jerk_cost_s)
         self.store = store
         self.run = MissionRun(self)
         self.mode = flavour.modes.at_boot
@@ -189,8 +187,7 @@ class Pilot:
             self.narrator.tell(FirmwareEvent.RETURN_LANDED)
         if self.mode is not FlightMode.AUTO:
             self.task_done = True
-        delay = self.flavour.disarm_delay(self.mode)
-        if delay is None:
+        if (delay := self.flavour.disarm_delay(self.mode)) is None:
             self._disarm(at_s, FirmwareEvent.DISARMED_LANDED)
         elif self.armed:
             self._disarm_after(delay, at_s, FirmwareEvent.DISARMED_LANDED)
@@ -306,13 +303,10 @@ class Pilot:
         self.stands_since_s = None
         self.fence.armed(now_s)
         self._ground_contact.armed(now_s)
-        if not self.config.drains_in_flight:
+        self._flew = self.flight.rouse()
+        if self._flew or not self.config.drains_in_flight:
             self.battery.start(now_s)
-        if self.flavour.drives:
-            self._flew = True
-            self.battery.start(now_s)
-            self.flight.rouse()
-        else:
+        if not self._flew:
             self._disarm_unused(now_s)
         if self.flavour.tells_origin_when_armed:
             self.outbox.broadcast(origin_position(self.config.origin, self._boot_us(now_s)))
@@ -327,8 +321,7 @@ class Pilot:
     @property
     def obstacles(self) -> tuple[str, ...]:
         """Why the vehicle can't be armed in its mode, in its words; empty when it can."""
-        obstacle = self.readiness.obstacle(self.mode)
-        if obstacle is not None:
+        if (obstacle := self.readiness.obstacle(self.mode)) is not None:
             return (obstacle,)
         return (*self.failsafes.obstacles, *self.fence.obstacles)
 
@@ -345,7 +338,7 @@ class Pilot:
         """Stop the motors; False in the air, unless forced."""
         if not self.armed:
             return True
-        if not (forced or self.flight.on_ground or self.flavour.drives):
+        if not (forced or self.flight.on_ground or self.flight.drives):
             self.narrator.tell(FirmwareEvent.DISARMING_REFUSED)
             return False
         self._disarm(now_s, FirmwareEvent.DISARMED)

@@ -315,7 +315,7 @@ class TelemetryReporter:
         del now_s
         flavour, activity = self._pilot.flavour, self._pilot.flight.activity
         landed = _LANDED_STATES.get(activity, mavlink.MAV_LANDED_STATE_IN_AIR)
-        if flavour.drives:
+        if self._pilot.flight.drives:
             landed = mavlink.MAV_LANDED_STATE_UNDEFINED
         return mavlink.MAVLink_extended_sys_state_message(flavour.vtol_state, landed)
 

@@ -61,7 +61,7 @@ def is_plain(mission: Mission) -> bool:
         or mission.areas
         or mission.terrain
         or _field_rules(mission)
-        or any(_given(uav, _OF_UAV) for uav in mission.uavs)
+        or any(_kind(uav) or _given(uav, _OF_UAV) for uav in mission.uavs)
         or any(task.path_enu_m or _given(task, _OF_TASK) for task in mission.tasks)
         or nobody_can(mission)
     )

@@ -69,6 +69,8 @@ class JoinedFlight:
         self.vehicle = SimulatedAutopilot(vehicle, flavour or ArduCopterModel(), self.now_s)
         self.codec = ChannelCodec(1, COMPONENT_ID, datagrams=False)
         self.reports: list[tuple[float, VehicleReport]] = []
+        self.waits_for = ""
+        """What the bridge said last that it waits for."""
         self.track_enu_m: list[tuple[float, float, float]] = []
         """Where the vehicle was, whenever anything happened."""
         self.track_s: list[float] = []
@@ -82,7 +84,9 @@ class JoinedFlight:
             if isinstance(action, SendBytes):
                 for message in self.codec.decode(action.data):
                     self.to_vehicle(autopilot.MavlinkReceived(0, message))
-            elif not isinstance(action, Telemetry | NotReady):
+            elif isinstance(action, NotReady):
+                self.waits_for = action.reason
+            elif not isinstance(action, Telemetry):
                 self.reports.append((self.now_s, action))
 
     def to_vehicle(self, event: autopilot.VehicleEvent) -> None:

@@ -53,7 +53,6 @@ class ArduRoverModel(ArduCopterModel):
     """Numbers, names and habits of Rover, where they are not ArduCopter's."""
 
     vehicle_type = mavlink.MAV_TYPE_GROUND_ROVER
-    drives = True
     vtol_state = mavlink.MAV_VTOL_STATE_UNDEFINED
     modes = ModeBehaviour(
         at_boot=FlightMode.MANUAL,

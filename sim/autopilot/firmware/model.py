@@ -191,9 +191,6 @@ class FirmwareModel(ABC):
     capabilities: int
     """MAV_PROTOCOL_CAPABILITY."""
     vehicle_type: int = mavlink.MAV_TYPE_QUADROTOR
-    drives: bool = False
-    """Whether it stays on the ground: it is under way as soon as its motors run, takes neither off
-    nor lands, and has no words for that (EXTENDED_SYS_STATE)."""
     vtol_state: int
     """MAV_VTOL_STATE."""
     version: int

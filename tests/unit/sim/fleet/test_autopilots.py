@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,12 +13,15 @@ from sim.fleet.autopilots import (
     RunningVehicles,
     SimulatedAutopilots,
     VehiclePlace,
+    check_commanded,
     parse_autopilots,
 )
 from sim.fleet.firmware import FirmwareKind, SitlFirmware, firmware_workplace
 from sim.fleet.layout import defaults_for
 from sim.fleet.passthrough import PassthroughOptions, check_passthrough, parse_command_styles
+from swarm.model.vehicles import VehicleKind
 from swarm.runtime.errors import InputError
+from tests.support import builders
 
 UAVS = ("uav1", "uav2", "uav3")
 A, B, C = "tcp:10.0.0.1:5760", "udpin:0.0.0.0:14550", "serial:/dev/ttyUSB0:57600"
@@ -179,3 +183,15 @@ def test_real_vehicles_are_given_more_time_and_room_than_simulated_ones() -> Non
     assert real.start_timeout_s > exact.start_timeout_s
     assert real.acceptance_radius_m > exact.acceptance_radius_m
     assert real.position_rate_hz < exact.position_rate_hz
+
+
+def test_kinds_that_are_not_simulated_or_commanded_so_are_one_line() -> None:
+    kinds = [VehicleKind.COPTER, VehicleKind.ROVER]
+    assert parse_autopilots("sim", UAVS, None, {}, kinds) == SimulatedAutopilots()
+    with pytest.raises(InputError, match="--autopilot: px4: no rover is simulated with that firm"):
+        parse_autopilots("sim-px4", UAVS, None, {}, kinds)
+    rover = replace(builders.uav("u1"), vehicle=VehicleKind.ROVER)
+    fleet = builders.mission([builders.uav("u0"), rover], [builders.task("t", 1.0)])
+    check_commanded(fleet, {"u0": CommandStyle.MISSION, "u1": CommandStyle.REPOSITION})
+    with pytest.raises(InputError, match="--command: mission: u1 is a rover, which is not comman"):
+        check_commanded(fleet, {"u1": CommandStyle.MISSION})

@@ -11,6 +11,7 @@ import pytest
 
 from sim.fleet.firmware import FirmwareKind, FirmwareProcess, SitlFirmware, find_firmware
 from swarm.model.frames import Origin, wgs84_from_enu
+from swarm.model.vehicles import VehicleKind, turning_acceleration_m_s2
 from swarm.runtime.errors import InputError
 from tests.support.builders import mission, task, uav
 
@@ -70,6 +71,78 @@ def test_battery_of_arducopter_lasts_for_a_shipped_mission() -> None:
     capacity_mah = float(dict(line.split() for line in text.splitlines())["BATT_CAPACITY"])
     # Recorded: 27 % of 3300 mAh in 110 s.
     assert 0.8 * capacity_mah / (0.27 * 3300.0 / 110.0) > 3000.0
+
+
+OTHERS = {
+    VehicleKind.ROVER: Path("/opt/ardurover"),
+    VehicleKind.QUADPLANE: Path("/opt/arduplane"),
+}
+MIXED = replace(
+    mission(
+        [
+            uav("u0"),
+            replace(uav("u1"), vehicle=VehicleKind.ROVER),
+            replace(
+                uav("u2"),
+                vehicle=VehicleKind.QUADPLANE,
+                speed_m_s=20.0,
+                acceleration_m_s2=turning_acceleration_m_s2(20.0, 80.0),
+            ),
+        ],
+        [task("t0", 1.0)],
+    ),
+    origin=ORIGIN,
+)
+
+
+def parameters_of(process: FirmwareProcess) -> dict[str, str]:
+    text = process.files[value(process, "--defaults")]
+    return dict(line.split() for line in text.splitlines())
+
+
+def test_ardupilot_has_a_program_and_a_model_for_each_kind_of_vehicle() -> None:
+    firmware = SitlFirmware(
+        FirmwareKind.ARDUPILOT, Path("/opt/arducopter"), Path("/tmp"), others=OTHERS
+    )
+    made = list(firmware.processes(MIXED, 1.0).values())
+
+    assert [each.command[0] for each in made] == [
+        "/opt/arducopter",
+        "/opt/ardurover",
+        "/opt/arduplane",
+    ]
+    assert [value(each, "--model") for each in made] == ["+", "rover", "quadplane"]
+    assert [each.url for each in made] == [f"tcp:127.0.0.1:{port}" for port in (5760, 5770, 5780)]
+    assert "FRAME_CLASS" not in parameters_of(made[1])
+    plane = parameters_of(made[2])
+    assert (plane["Q_ENABLE"], plane["Q_MAV_TYPE"], plane["WP_LOITER_RAD"]) == ("1", "22", "80")
+
+
+@pytest.mark.parametrize(
+    ("kind", "variables", "said"),
+    [
+        (FirmwareKind.PX4, {}, "--autopilot: px4: a rover is not flown with PX4; fly it with"),
+        (FirmwareKind.ARDUPILOT, {}, "SWARM_SITL_ROVER: a rover: no firmware is known; give"),
+        (
+            FirmwareKind.ARDUPILOT,
+            {"SWARM_SITL_ROVER": "/nowhere/ardurover"},
+            "SWARM_SITL_ROVER: /nowhere/ardurover: there is no program /nowhere/ardurover; give",
+        ),
+    ],
+)
+def test_a_rover_without_its_program_is_one_line(
+    kind: FirmwareKind, variables: dict[str, str], said: str
+) -> None:
+    with pytest.raises(InputError) as caught:
+        find_firmware(kind, 2, None, variables, [VehicleKind.COPTER, VehicleKind.ROVER])
+    assert str(caught.value).startswith(said)
+
+
+def test_a_fleet_of_rovers_needs_no_copters_program(tmp_path: Path) -> None:
+    rover = program(tmp_path / "ardurover")
+    variables = {"SWARM_SITL_ROVER": str(rover)}
+    found = find_firmware(FirmwareKind.ARDUPILOT, 2, None, variables, [VehicleKind.ROVER])
+    assert found.others == {VehicleKind.ROVER: rover}
 
 
 def test_every_px4_has_ports_and_system_id_of_its_own() -> None:

@@ -15,13 +15,15 @@ from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import rule_by_name
 from swarm.model import Mission
+from swarm.model.mission import kinds_of
+from swarm.model.vehicles import VehicleKind
 from swarm.runtime.errors import InputError
 from swarm.scenario import format_scenario, load_scenario, parse_scenario
 from swarm.scenario.files import resolve_scenario, shipped_scenarios
 
 PLAIN = ["meadow", "orchard", "table-1", "valley-popups", "valley-survey"]
 """Those of schema 1."""
-NAMES = sorted([*PLAIN, "hayfield", "reservoir-inspection", "ridge", "vineyard"])
+NAMES = sorted([*PLAIN, "hayfield", "reservoir-inspection", "ridge", "roundup", "vineyard"])
 
 
 def shipped(name: str) -> Mission:
@@ -206,3 +208,14 @@ def test_shipped_scenario_survives_being_written(name: str) -> None:
     mission = shipped(name)
 
     assert parse_scenario(format_scenario(mission).encode(), name) == mission
+
+
+def test_roundup_has_a_task_for_every_kind_of_vehicle() -> None:
+    mission = shipped("roundup")
+    able = {
+        uav.id: {task.kind for task in mission.tasks if mission.success(uav, task) > 0.0}
+        for uav in mission.uavs
+    }
+
+    assert kinds_of(mission) == tuple(VehicleKind)
+    assert able == {"copter": {"roof", "herd"}, "rover": {"trough"}, "plane": {"herd"}}

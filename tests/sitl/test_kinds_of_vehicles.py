@@ -1,0 +1,231 @@
+"""A rover and a QuadPlane behind the bridge, and in a fleet with a copter.
+
+In exact virtual time with the simulated autopilots; and a whole run of `roundup`, in which real
+firmware drives and flies where SWARM_SITL_ARDUCOPTER, SWARM_SITL_ROVER and SWARM_SITL_PLANE say
+where it is, else the simulated autopilots.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from agent.core.interface import (
+    Arrived,
+    GoTo,
+    HandedOver,
+    Held,
+    Hold,
+    Home,
+    Landed,
+    Prepare,
+    Refused,
+    Return,
+    Swap,
+    Swapped,
+    VehicleReady,
+)
+from agent.vehicle.config import CommandStyle
+from sim.autopilot.config import ServedBase, VehicleConfig
+from sim.autopilot.firmware import FirmwareModelName, firmware_model
+from sim.autopilot.flight import FlightMode
+from sim.fleet.ardupilot_vehicles import ARDUPILOT_VEHICLES
+from swarm.model.vehicles import VehicleKind
+from swarm.scenario import load_scenario
+from swarm.scenario.files import resolve_scenario
+from tests.process.mission import SwarmRun
+from tests.process.pace import pace
+from tests.sitl.test_bridge_autopilot import CONFIG, HOME_M, VEHICLE, JoinedFlight
+
+pytestmark = pytest.mark.sitl
+
+CIRCLE_M, ON_CIRCLE_M = 60.0, 60.0 * 1.15 + 0.1
+VEHICLES = {
+    VehicleKind.ROVER: replace(VEHICLE, vehicle=VehicleKind.ROVER, acceleration_m_s2=1.0),
+    VehicleKind.QUADPLANE: replace(VEHICLE, vehicle=VehicleKind.QUADPLANE, circle_m=CIRCLE_M),
+}
+STARTS = {
+    VehicleKind.ROVER: Prepare(HOME_M, 4.0, ground_up_m=0.0, vehicle=VehicleKind.ROVER),
+    VehicleKind.QUADPLANE: Prepare(
+        (*HOME_M[:2], 30.0), 20.0, ground_up_m=0.0, vehicle=VehicleKind.QUADPLANE
+    ),
+}
+KINDS = pytest.mark.parametrize("kind", list(VEHICLES))
+FAR = {VehicleKind.ROVER: (5.0, 80.0, 0.0), VehicleKind.QUADPLANE: (5.0, 900.0, 30.0)}
+
+
+def joined(kind: VehicleKind, vehicle: VehicleConfig | None = None) -> JoinedFlight:
+    flavour = firmware_model(FirmwareModelName.ARDUPILOT, kind)
+    return JoinedFlight(CONFIG, flavour, vehicle or VEHICLES[kind])
+
+
+def started(kind: VehicleKind) -> JoinedFlight:
+    flight = joined(kind)
+    flight.to_bridge(STARTS[kind])
+    flight.run_until(VehicleReady())
+    return flight
+
+
+def away_m(flight: JoinedFlight, place: tuple[float, float, float]) -> float:
+    return math.dist(flight.vehicle.pilot.position_enu_m(flight.now_s)[:2], place[:2])
+
+
+def test_a_rover_drives_without_takeoff_or_landing_and_is_disarmed_at_home() -> None:
+    flight = started(VehicleKind.ROVER)
+    assert flight.now_s < 6.0
+    pilot = flight.vehicle.pilot
+    for leg, target in enumerate([(5.0, 30.0, 0.0), (30.0, 30.0, 0.0)], start=1):
+        flight.to_bridge(GoTo(leg, target))
+        flight.run_until(Arrived(leg))
+        assert away_m(flight, target) <= 1.0
+        flight.wait(20.0)
+        assert away_m(flight, target) <= 0.01
+    assert {up_m for _, _, up_m in flight.track_enu_m} == {0.0}
+    flight.to_bridge(Return("done", via_enu_m=HOME_M))
+    flight.run_until(Home())
+    assert not pilot.armed
+    assert away_m(flight, HOME_M) <= 1.0
+
+
+def test_a_rover_takes_as_long_as_its_parameters_say() -> None:
+    flight = started(VehicleKind.ROVER)
+    began_s = flight.now_s
+    flight.to_bridge(GoTo(1, (5.0, 80.0, 0.0)))
+    arrived_s = flight.run_until(Arrived(1))
+    assert arrived_s - began_s == pytest.approx(80.0 / 4.0 + 4.0 / 1.0, abs=0.5)
+
+
+def test_a_plane_passes_its_target_and_waits_on_a_circle() -> None:
+    flight = started(VehicleKind.QUADPLANE)
+    for leg, target in enumerate([(5.0, 400.0, 30.0), (700.0, 400.0, 45.0)], start=1):
+        began_s, length_m = flight.now_s, away_m(flight, target)
+        flight.to_bridge(GoTo(leg, target))
+        arrived_s = flight.run_until(Arrived(leg))
+        assert arrived_s - began_s <= (length_m + math.pi * CIRCLE_M) / 20.0
+        seen = len(flight.track_enu_m)
+        flight.wait(40.0)
+        assert all(math.dist(at[:2], target[:2]) <= ON_CIRCLE_M for at in flight.track_enu_m[seen:])
+        assert flight.track_enu_m[-1][2] == pytest.approx(target[2])
+    flight.to_bridge(Return("done", via_enu_m=(*HOME_M[:2], 30.0), land=True))
+    flight.run_until(Home())
+    assert not flight.vehicle.pilot.armed
+    assert away_m(flight, HOME_M) <= 0.01
+
+
+@KINDS
+def test_it_is_stopped_and_goes_on(kind: VehicleKind) -> None:
+    flight = started(kind)
+    flight.to_bridge(GoTo(1, FAR[kind]))
+    flight.wait(6.0)
+    here_m = flight.vehicle.pilot.position_enu_m(flight.now_s)
+    flight.to_bridge(Hold("the operator says so"))
+    flight.run_until(Held())
+    flight.wait(60.0)
+    stays_m = ON_CIRCLE_M if kind is VehicleKind.QUADPLANE else 10.0
+    assert away_m(flight, here_m) <= stays_m
+    flight.to_bridge(replace(STARTS[kind], resume=True))
+    flight.run_until(VehicleReady())
+    flight.to_bridge(GoTo(2, FAR[kind]))
+    flight.run_until(Arrived(2))
+    assert not any(isinstance(report, HandedOver) for _, report in flight.reports)
+
+
+@KINDS
+def test_killed_on_its_way_and_started_anew_it_goes_on(kind: VehicleKind) -> None:
+    flight = started(kind)
+    flight.to_bridge(GoTo(3, FAR[kind]))
+    flight.wait(5.0)
+    flight.restart_bridge(dead_s=4.0)
+    flight.to_bridge(replace(STARTS[kind], resume=True))
+    flight.run_until(VehicleReady())
+    flight.to_bridge(GoTo(1, FAR[kind]))
+    flight.run_until(Arrived(1))
+
+
+@KINDS
+def test_its_pilot_takes_it_over(kind: VehicleKind) -> None:
+    flight = started(kind)
+    flight.to_bridge(GoTo(1, FAR[kind]))
+    flight.wait(3.0)
+    flight.vehicle.pilot.set_mode(FlightMode.MANUAL, flight.now_s)
+    flight.run_until(HandedOver("its pilot switched it to MANUAL"))
+
+
+@KINDS
+def test_another_kind_than_the_scenarios_is_not_started(kind: VehicleKind) -> None:
+    flight = joined(kind)
+    flight.to_bridge(replace(STARTS[kind], vehicle=VehicleKind.COPTER))
+    flight.wait(20.0)
+    assert flight.waits_for == f"the vehicle is a {kind}, the scenario has a copter"
+    assert not flight.vehicle.pilot.armed
+
+
+@KINDS
+def test_it_is_not_commanded_by_missions(kind: VehicleKind) -> None:
+    flavour = firmware_model(FirmwareModelName.ARDUPILOT, kind)
+    flight = JoinedFlight(replace(CONFIG, command=CommandStyle.MISSION), flavour, VEHICLES[kind])
+    flight.to_bridge(STARTS[kind])
+    flight.wait(20.0)
+    assert flight.waits_for.startswith(f"a {kind} is not commanded by missions")
+    assert not flight.vehicle.pilot.armed
+
+
+def test_a_rover_that_somebody_else_has_armed_is_left_alone() -> None:
+    flight = joined(VehicleKind.ROVER)
+    flight.wait(5.0)
+    flight.vehicle.pilot.set_mode(FlightMode.GUIDED, flight.now_s)
+    assert flight.vehicle.pilot.arm(flight.now_s, forced=False)
+    flight.wait(2.0)  # until its heartbeat says so
+    flight.to_bridge(STARTS[VehicleKind.ROVER])
+    flight.wait(20.0)
+    assert flight.waits_for == "armed by somebody else: disarm it"
+    assert flight.vehicle.pilot.position_enu_m(flight.now_s) == HOME_M
+    flight.vehicle.pilot.disarm(flight.now_s, forced=True)
+    flight.run_until(Refused)
+    assert not flight.vehicle.pilot.armed
+
+
+def test_a_rover_changes_its_battery_at_a_base() -> None:
+    base_m = (40.0, 20.0, 0.0)
+    vehicle = replace(VEHICLES[VehicleKind.ROVER], bases=(ServedBase(base_m, 5.0),))
+    flavour = firmware_model(FirmwareModelName.ARDUPILOT, VehicleKind.ROVER)
+    flight = JoinedFlight(replace(CONFIG, ready_by_itself=True), flavour, vehicle)
+    flight.to_bridge(STARTS[VehicleKind.ROVER])
+    flight.run_until(VehicleReady())
+    flight.to_bridge(Swap(1, base_m, swap_s=5.0))
+    flight.run_until(Landed(1))
+    assert not flight.vehicle.pilot.armed
+    assert away_m(flight, base_m) <= 1.0
+    flight.run_until(Swapped(1))
+    flight.to_bridge(GoTo(2, (5.0, 60.0, 0.0)))
+    flight.run_until(Arrived(2))
+    assert away_m(flight, (5.0, 60.0, 0.0)) <= 1.0
+
+
+# -- a fleet of all kinds ---------------------------------------------------------------
+
+
+def test_copter_rover_and_plane_share_a_mission(
+    tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    real = all(os.environ.get(vehicle.variable) for vehicle in ARDUPILOT_VEHICLES.values())
+    record_property("flown", "real" if real else "simulated")
+    scenario = resolve_scenario("roundup")
+    words = ["--autopilot", "ardupilot" if real else "sim"]
+    speedup = 2.0 if real else pace(10.0)
+    with SwarmRun([str(scenario), "--speedup", f"{speedup:g}", *words], tmp_path) as run:
+        status, told = run.result(timeout_s=400.0)
+        run.assert_nothing_left()
+        story = run.story()
+    assert status == 0, story
+    assert sorted(told["done"]) == sorted(task.id for task in load_scenario(scenario).tasks), story
+    assert told["lost_uavs"] == [], story
+    assert told["processes"] == [], story
+    by_uav = told["executed_routes"]
+    assert {task.partition("-")[0] for task in by_uav["rover"]} == {"trough"}, story
+    assert {task.partition("-")[0] for task in by_uav["plane"]} == {"herd"}, story

@@ -1,0 +1,166 @@
+"""Which firmware drives or flies what, and what each kind of vehicle says of itself."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from agent.vehicle.firmware import firmware_of, unsupported
+from agent.vehicle.firmware.ardupilot import ArduCopter
+from agent.vehicle.firmware.ardurover import ArduRover
+from agent.vehicle.firmware.quadplane import QuadPlane
+from agent.vehicle.messages import Heartbeat
+from swarm.model.vehicles import TRAITS, VehicleKind
+
+ARDUPILOT, PX4 = 3, 12
+ROVER, PLANE = ArduRover(), QuadPlane()
+FINE = {
+    "FS_GCS_ENABL": 1.0,
+    "FS_LONG_ACTN": 1.0,
+    "FS_LONG_TIMEOUT": 5.0,
+    "Q_RTL_MODE": 1.0,
+    "MAV_GCS_SYSID": 255.0,
+    "MAV_GCS_SYSID_HI": 0.0,
+    "BATT_FS_LOW_ACT": 1.0,
+}
+
+
+def heartbeat(vehicle_type: int, autopilot: int = ARDUPILOT) -> Heartbeat:
+    return Heartbeat(
+        autopilot=autopilot,
+        vehicle_type=vehicle_type,
+        armed=False,
+        custom_mode=0,
+        system_status=3,
+    )
+
+
+@pytest.mark.parametrize(
+    ("vehicle_type", "kind"),
+    [
+        (2, ArduCopter),
+        (10, ArduRover),
+        (11, ArduRover),
+        (20, QuadPlane),
+        (21, QuadPlane),
+        (22, QuadPlane),
+        (1, None),
+        (12, None),
+    ],
+)
+def test_ardupilot_is_told_by_its_kind_of_vehicle(vehicle_type: int, kind: type | None) -> None:
+    found = firmware_of(heartbeat(vehicle_type))
+    assert (None if found is None else type(found)) is kind
+
+
+@pytest.mark.parametrize("vehicle_type", [1, 10, 11, 20, 22])
+def test_px4_flies_multicopters_alone(vehicle_type: int) -> None:
+    assert firmware_of(heartbeat(vehicle_type, PX4)) is None
+
+
+def test_a_plane_that_tells_no_rotors_is_told_what_to_set() -> None:
+    assert "set Q_MAV_TYPE 22" in unsupported(heartbeat(1))
+    assert unsupported(heartbeat(12)) == (
+        "autopilot 3 on vehicle type 12 (MAV_AUTOPILOT, MAV_TYPE) is not supported"
+    )
+
+
+def test_kinds_have_the_traits_that_missions_know() -> None:
+    assert (ROVER.kind, PLANE.kind) == (VehicleKind.ROVER, VehicleKind.QUADPLANE)
+    assert ROVER.traits is TRAITS[VehicleKind.ROVER]
+    assert ROVER.traits.drives
+    assert not PLANE.traits.stays
+
+
+def test_modes_have_the_numbers_of_their_kind() -> None:
+    assert [ROVER.mode_name(mode) for mode in (4, 11, 15)] == ["HOLD", "RTL", "GUIDED"]
+    assert [PLANE.mode_name(mode) for mode in (15, 20, 21)] == ["GUIDED", "QLAND", "QRTL"]
+    assert ROVER.is_commanded(15)
+    assert not ROVER.is_commanded(4)
+    assert all(PLANE.is_returning(mode) for mode in (11, 20, 21))
+
+
+def test_a_rover_has_no_takeoff_to_tell() -> None:
+    with pytest.raises(ValueError, match="does not take off"):
+        ROVER.takeoff(10.0, 0.0)
+
+
+def test_a_plane_is_told_a_speed_through_the_air() -> None:
+    assert PLANE.change_speed(20.0).params[:2] == (0.0, 20.0)
+    assert ROVER.change_speed(3.0).params[:2] == (1.0, 3.0)
+
+
+# -- without an agent ------------------------------------------------------------------
+
+
+def test_a_rover_stands_where_it_was_sent_whatever_is_set() -> None:
+    told = ROVER.failsafes({"BATT_FS_LOW_ACT": 2.0}, 255)
+    assert told.comes_home
+    assert told.battery is None
+    assert ROVER.failsafes({}, 255).battery is not None
+
+
+def test_a_plane_comes_home_where_all_is_set() -> None:
+    told = PLANE.failsafes(FINE, 255)
+    assert told.comes_home
+    assert told.agent_lost == "returns after 5 s"
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "remedy"),
+    [
+        ("FS_GCS_ENABL", 0.0, "set FS_GCS_ENABL 1"),
+        ("FS_GCS_ENABL", 3.0, "set FS_GCS_ENABL 1"),
+        ("FS_LONG_ACTN", 0.0, "set FS_LONG_ACTN 1"),
+        ("Q_RTL_MODE", 0.0, "set Q_RTL_MODE 1"),
+        ("MAV_GCS_SYSID", 7.0, "set MAV_GCS_SYSID 255"),
+        ("FS_LONG_ACTN", None, "set FS_LONG_ACTN 1"),
+    ],
+)
+def test_a_plane_circles_where_one_of_them_is_not(
+    name: str, value: float | None, remedy: str
+) -> None:
+    values = {key: each for key, each in FINE.items() if key != name}
+    if value is not None:
+        values[name] = value
+    told = PLANE.failsafes(values, 255)
+    assert not told.comes_home
+    assert told.remedy == remedy
+    assert "circle" in told.agent_lost
+
+
+# -- how long legs take ----------------------------------------------------------------
+
+
+def test_a_rover_speeds_up_by_the_least_of_its_limits_and_an_s_curve() -> None:
+    limits = ROVER.kinematics({"WP_ACCEL": 0.0, "ATC_ACCEL_MAX": 1.0, "WP_JERK": 0.0})
+    assert limits.acceleration is not None
+    assert (limits.acceleration.name, limits.acceleration.value) == ("ATC_ACCEL_MAX", 1.0)
+    acceleration_m_s2 = limits.leg_acceleration_m_s2(3.0)
+    assert acceleration_m_s2 is not None
+    assert 3.0 / acceleration_m_s2 == pytest.approx(3.0 / 1.0 + 1.0 / 1.0)
+
+    slower = ROVER.kinematics({"WP_ACCEL": 0.5, "ATC_ACCEL_MAX": 1.0, "WP_JERK": 2.0})
+    acceleration_m_s2 = slower.leg_acceleration_m_s2(3.0)
+    assert acceleration_m_s2 is not None
+    assert 3.0 / acceleration_m_s2 == pytest.approx(3.0 / 0.5 + 0.5 / 2.0)
+
+
+def test_a_rover_that_tells_nothing_has_no_limit() -> None:
+    assert ROVER.kinematics({}).leg_acceleration_m_s2(3.0) is None
+
+
+@pytest.mark.parametrize("radius_m", [60.0, -60.0])
+def test_a_plane_turns_on_its_circle(radius_m: float) -> None:
+    limits = PLANE.kinematics({"WP_LOITER_RAD": radius_m})
+    acceleration_m_s2 = limits.leg_acceleration_m_s2(20.0)
+    assert acceleration_m_s2 is not None
+    assert 20.0 / acceleration_m_s2 == pytest.approx(60.0 / 20.0)
+
+
+def test_a_circle_that_nobody_would_believe_is_named() -> None:
+    limits = PLANE.kinematics({"WP_LOITER_RAD": 0.0})
+    assert limits.circle is None
+    assert [each.name for each in limits.absurd] == ["WP_LOITER_RAD"]
+    assert math.isfinite(limits.absurd[0].value)
