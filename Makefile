@@ -85,7 +85,9 @@ format: $(VENV)/.installed-dev
 	$(BIN)/ruff check --fix .
 
 $(VENV)/bin/python:
-	$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
+	@$(PYTHON) -c 'import sys; sys.exit("Python 3.11 or newer is needed, this is " + sys.version.split()[0] if sys.version_info < (3, 11) else 0)'
+	@command -v $${CXX:-c++} >/dev/null || \
+		{ echo "make: no C++ compiler; on Debian: sudo apt-get install g++" >&2; exit 1; }
 	$(PYTHON) -m venv $(VENV)
 
 # The build tools are installed beside the project, so that a change in one kernel compiles one file.
@@ -114,10 +116,12 @@ sanitize: $(VENV)/.installed-dev
 
 # The demo needs no extra; a dashboard, a plot or a recording is what one asks for next.
 $(VENV)/.installed: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python
+	@echo "installing into $(VENV), and compiling the kernels: two or three minutes, in silence"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[ground]'
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python
+	@echo "installing into $(VENV) all that tests need, too: some minutes, in silence"
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
 	@touch $@ $(VENV)/.installed
 

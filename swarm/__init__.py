@@ -29,7 +29,7 @@ from swarm.lazy_names import names_from
 
 TYPE_CHECKING = False  # as typing has it, which everybody would have to import for it
 if TYPE_CHECKING:
-    from swarm.allocation.own_rule import Turn
+    from swarm.allocation.own_rule import DecisionRule, Turn
     from swarm.interface import Flight, evaluate, load, plan, read_recording, simulate
     from swarm.model import Evaluation, Mission, Plan, Task, TaskId, Uav, UavId
     from swarm.runtime.errors import SwarmError
@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 __all__ = [
+    "DecisionRule",
     "Evaluation",
     "Flight",
     "Mission",
@@ -59,7 +60,7 @@ if not TYPE_CHECKING:  # a type checker must know no other name
     __getattr__ = names_from(
         __name__,
         {
-            "swarm.allocation.own_rule": ("Turn",),
+            "swarm.allocation.own_rule": ("DecisionRule", "Turn"),
             "swarm.interface": ("Flight", "evaluate", "load", "plan", "read_recording", "simulate"),
             "swarm.model": ("Evaluation", "Mission", "Plan", "Task", "TaskId", "Uav", "UavId"),
             "swarm.runtime.errors": ("SwarmError",),

@@ -1,4 +1,4 @@
-"""What is drawn from the facts for people and their tools: map, scene, curves and story.
+"""What is drawn from the facts for people and their tools: map, scene and story.
 
 Everything here follows from what is known of the mission; nothing of it is read back. Each scene
 message shows one kind of thing whole, so that a viewer may begin anywhere.
@@ -10,10 +10,7 @@ import json
 import math
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Final
-
-from pydantic import TypeAdapter
 
 from coordinator.mission_view.drawing import (
     AREA_COLOUR,
@@ -31,8 +28,9 @@ from coordinator.mission_view.drawing import (
     ways_ahead,
 )
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.mission_view.scene import LEFT_OUT, TAKEN, Scene, scene_of
+from coordinator.mission_view.scene import LEFT_OUT, Scene, scene_of
 from coordinator.mission_view.uav_state import LOST, UavView
+from coordinator.recording.curves import fleet_of, progress_of
 from coordinator.recording.foxglove_schemas import (
     LOCATION_FIX,
     LOG,
@@ -52,58 +50,13 @@ from coordinator.recording.foxglove_schemas import (
 from coordinator.recording.records import FileMessage
 from swarm.model import Area, Base, Origin, Zone
 from swarm.model.frames import wgs84_from_enu
-from swarm.protocol.board import TaskState
 
-PROGRESS: Final = "peckorder.Progress"
 FRAME: Final = "mission"
 """Name of the local frame: metres east, north and up of the mission's origin."""
 MOST_LABELS: Final = 150
 """A scene of more tasks shows them without their names."""
 _LEVEL: Final = re.compile(r"""\blevel["']?[=:] ?["']?(\w+)""")
 """In lines of logfmt and in JSON."""
-
-
-@dataclass(frozen=True, slots=True)
-class _Progress:
-    """How far the mission is, as numbers that can be plotted."""
-
-    now_s: float
-    mission_s: float | None
-    phase: str
-    epoch: int | None
-    rule: str | None
-    objective: float
-    """J so far [value·s]."""
-    plan_objective: float | None
-    """J of the lists it began with, flown without delay [value·s]."""
-    bound: float | None
-    """No lists have more than this J [value·s]."""
-    open: int
-    """Tasks nobody flies to."""
-    taken: int
-    """Open tasks that a UAV flies to or serves."""
-    done: int
-    failed: int
-    withdrawn: int
-    uavs: int
-    lost: int
-    """UAVs that disappeared while they took part."""
-    dropped: int
-    """Messages that all agents together have dropped."""
-    left_out: int = 0
-    """Open tasks that the plan leaves out."""
-
-
-_ADAPTER: Final = TypeAdapter(_Progress)
-
-
-def _progress_schema() -> bytes:
-    schema = _ADAPTER.json_schema()
-    schema["title"] = PROGRESS
-    return json.dumps(schema, separators=(",", ":")).encode()
-
-
-PROGRESS_SCHEMA: Final = _progress_schema()
 
 
 class FoxgloveTopics:
@@ -129,7 +82,8 @@ class FoxgloveTopics:
         if mission_state.replica.brief is None:
             return
         scene = scene_of(mission_state, now_s)
-        yield _progress(mission_state, scene, now_s)
+        yield progress_of(mission_state, scene, now_s)
+        yield fleet_of(scene)
         yield from self._fixes(scene, Origin(*mission_state.replica.brief.origin), time_ns)
         size_m = drawn_size_m(scene)
         yield _scene("uavs", [_uav(view, size_m, time_ns) for view in scene.uavs])
@@ -195,30 +149,6 @@ def level_of(line: str) -> str:
 def log_line(name: str, message: str, level: str, time_ns: int) -> FileMessage:
     """A line of the story, or of a process's log."""
     return FileMessage("/log", LOG, _bytes(log(name, message, level, time_ns)))
-
-
-def _progress(mission_state: MissionState, scene: Scene, now_s: float) -> FileMessage:
-    plan, counts = mission_state.plan, scene.counts
-    progress = _Progress(
-        now_s=now_s,
-        mission_s=scene.mission_s,
-        phase=scene.phase,
-        epoch=scene.epoch,
-        rule=scene.rule,
-        objective=scene.objective,
-        plan_objective=scene.planned_objective,
-        bound=plan.bound if scene.optimum is None and plan is not None else scene.optimum,
-        open=counts[TaskState.OPEN] + counts[LEFT_OUT],
-        taken=counts[TAKEN],
-        done=counts[TaskState.DONE],
-        failed=counts[TaskState.FAILED],
-        withdrawn=counts[TaskState.WITHDRAWN],
-        uavs=len(scene.uavs),
-        lost=len(mission_state.lost),
-        dropped=scene.dropped,
-        left_out=len(scene.left_out),
-    )
-    return FileMessage("/progress", PROGRESS, _ADAPTER.dump_json(progress))
 
 
 def _scene(name: str, entities: list[Json]) -> FileMessage:

@@ -15,14 +15,9 @@ from typing import Final, Generic, Protocol, TypeVar
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.mission_view.observation import MissionObserver
+from coordinator.recording.curves import CURVE_SCHEMAS
 from coordinator.recording.foxglove_schemas import FOXGLOVE_SCHEMAS
-from coordinator.recording.foxglove_topics import (
-    PROGRESS,
-    PROGRESS_SCHEMA,
-    FoxgloveTopics,
-    level_of,
-    log_line,
-)
+from coordinator.recording.foxglove_topics import FoxgloveTopics, level_of, log_line
 from coordinator.recording.growing_mcap import GrowingMcap
 from coordinator.recording.records import (
     FORMAT,
@@ -133,9 +128,8 @@ class Recorder:
         self.mcap = GrowingMcap(f"peckorder {__version__}", about.metadata(), METADATA)
         for name in SCHEMAS:
             self.mcap.define(name, schema_of(name))
-        for name, schema in FOXGLOVE_SCHEMAS.items():
+        for name, schema in (*FOXGLOVE_SCHEMAS.items(), *CURVE_SCHEMAS.items()):
             self.mcap.define(name, schema)
-        self.mcap.define(PROGRESS, PROGRESS_SCHEMA)
         self._mission = about.mission
         self._observer = MissionObserver(about.mission, about.timing, None)
         self._pictures = FoxgloveTopics()

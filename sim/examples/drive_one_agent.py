@@ -1,4 +1,5 @@
-"""Drive one agent: its real core and MAVLink bridge, against the model of an ArduCopter.
+# %% [markdown]
+"""# Drive one agent: its real core and MAVLink bridge, against the model of an ArduCopter.
 
     python -m sim.examples.drive_one_agent
 
@@ -7,6 +8,7 @@ bridge to the autopilot's model and back, and what the vehicle reports goes to t
 the seams of the runtime: cores take events and give actions, and know neither clock nor socket.
 """
 
+# %%
 from __future__ import annotations
 
 from collections.abc import Callable
@@ -32,11 +34,17 @@ MISSION = swarm.Mission(
     ),
 )
 
+# %% [markdown]
+"""The vehicle: a simulated autopilot behind the bridge that also flies real ones. What it reports
+is printed and handed on.
+"""
 
+
+# %%
 def make_vehicle(
     queue: EventQueue, uav: str, report: Callable[[VehicleReport], None]
 ) -> BridgedVehicle:
-    """A simulated autopilot behind a bridge; what it reports is printed and handed on."""
+    """A simulated autopilot behind a bridge."""
 
     def tell(news: VehicleReport) -> None:
         if not isinstance(news, Telemetry):
@@ -52,19 +60,19 @@ def make_plan(mission: swarm.Mission, method: str, seed: int) -> swarm.Plan:
     return swarm.plan(mission, method, seed=seed, bound=False)
 
 
-def main() -> None:
-    """Fly to both tasks and land."""
-    world = World(
-        MISSION,
-        make_plan,
-        method="greedy",
-        seed=0,
-        setting=WorldSettings(lambda queue: IdealNetwork(queue, 0.0), vehicle=make_vehicle),
-    )
-    world.run(limit_s=600.0)
-    result = world.mission_state.result()
-    print(f"done: {', '.join(result.done)}; J {result.executed_objective:.2f} value·s")
+# %% [markdown]
+"""The world: a queue of events, a bus that loses nothing, the coordinator, and the agent. It flies
+to both tasks and lands.
+"""
 
-
-if __name__ == "__main__":
-    main()
+# %%
+world = World(
+    MISSION,
+    make_plan,
+    method="greedy",
+    seed=0,
+    setting=WorldSettings(lambda queue: IdealNetwork(queue, 0.0), vehicle=make_vehicle),
+)
+world.run(limit_s=600.0)
+result = world.mission_state.result()
+print(f"done: {', '.join(result.done)}; J {result.executed_objective:.2f} value·s")

@@ -6,19 +6,18 @@ of the page with a real browser. Look at each before it is kept.
 
 from __future__ import annotations
 
-import io
 import os
 import signal
 import sys
 import tempfile
 from pathlib import Path
 
-from PIL import Image
 from playwright.sync_api import Page, expect
 
 from coordinator.dashboard.access import listen
 from tests.process.browser import open_page
 from tests.process.mission import SwarmRun
+from tests.support.gallery import keep
 
 FOLDER = Path("coordinator/dashboard/screenshots")
 PATIENCE_MS = 120_000.0
@@ -31,13 +30,6 @@ def wait_for_done(page: Page, count: int) -> None:
         arg=count,
         timeout=PATIENCE_MS,
     )
-
-
-def keep(page: Page, file: Path) -> None:
-    """Write what the page shows in 256 colours, which is a third of the size."""
-    with Image.open(io.BytesIO(page.screenshot())) as picture:
-        few = picture.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE, kmeans=4)
-        few.save(file, optimize=True)
 
 
 def take(folder: Path) -> None:
@@ -54,14 +46,14 @@ def take(folder: Path) -> None:
             page.emulate_media(color_scheme="dark")
             expect(page.locator("#phase")).to_have_text("running", timeout=PATIENCE_MS)
             wait_for_done(page, 18)
-            keep(page, folder / "desktop.png")
+            keep(page.screenshot(), folder / "desktop.png")
 
             page.emulate_media(color_scheme="light")
             page.locator("#panel-fleet tr[data-id=uav03]").click()
             page.get_by_role("tab", name="Decisions").click()
             page.locator("#panel-choices summary").first.click()
             page.wait_for_timeout(1000)
-            keep(page, folder / "decisions.png")
+            keep(page.screenshot(), folder / "decisions.png")
 
             page.keyboard.press("Escape")
             page.get_by_role("tab", name="Fleet").click()
@@ -71,7 +63,7 @@ def take(folder: Path) -> None:
             page.emulate_media(color_scheme="dark")
             page.keyboard.press("f")
             page.wait_for_timeout(1500)
-            keep(page, folder / "phone.png")
+            keep(page.screenshot(), folder / "phone.png")
 
 
 if __name__ == "__main__":
