@@ -64,6 +64,16 @@ class ArduRoverModel(ArduCopterModel):
         set_mode_acknowledged_as=mavlink.MAVLINK_MSG_ID_SET_MODE,
     )
     mode_names = MappingProxyType({number: (mode, mode.value) for number, mode in _MODES.items()})
+    told_modes = MappingProxyType(
+        {
+            FlightMode.MANUAL: "Manual",
+            FlightMode.HOLD: "Hold",
+            FlightMode.LOITER: "Loiter",
+            FlightMode.AUTO: "Auto",
+            FlightMode.RTL: "RTL",
+            FlightMode.GUIDED: "Guided",
+        }
+    )
     missions = MissionBehaviour(first_item=1, restarts=True)
     jerk_cost_s = staticmethod(ardurover_jerk_s)
     forgets_speed = False

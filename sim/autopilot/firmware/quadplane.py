@@ -67,6 +67,18 @@ class QuadPlaneModel(ArduCopterModel):
     mode_names = MappingProxyType(
         {number: (mode, _NAMES.get(number, mode.value)) for number, mode in _MODES.items()}
     )
+    told_modes = MappingProxyType(
+        {
+            FlightMode.MANUAL: "Manual",
+            FlightMode.AUTO: "Auto",
+            FlightMode.GUIDED: "Guided",
+            FlightMode.STABILIZE: "QStabilize",
+            FlightMode.ALT_HOLD: "QHover",
+            FlightMode.LOITER: "QLoiter",
+            FlightMode.LAND: "QLand",
+            FlightMode.RTL: "QRTL",
+        }
+    )
     missions = MissionBehaviour(first_item=1, restarts=True)
     jerk_cost_s = staticmethod(no_jerk_s)
     forgets_speed = False

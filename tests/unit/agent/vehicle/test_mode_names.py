@@ -37,6 +37,13 @@ def named(fake: type[FakeCopter]) -> FakeCopter:
     return vehicle
 
 
+def taken(flight: BridgeFlight) -> str:
+    """Why the vehicle is no longer ours, once it is not."""
+    handed = flight.run_until(HandedOver)
+    assert isinstance(handed, HandedOver)
+    return handed.reason
+
+
 def test_messages_are_read_as_pymavlink_writes_them() -> None:
     whole = b"A name of five and thirty characters"[:35]
     assert heard(mode(25, 0xFFFFFFFF, whole)) == [AvailableMode(0xFFFFFFFF, whole.decode(), 25, 25)]
@@ -69,7 +76,7 @@ def test_every_mode_is_asked_for_once_and_a_pilots_is_called_by_its_name(
     asked = [int(m.param2) for m in vehicle.commands(ASK)]
     assert asked == ([0] if fake is FakePx4 else [0, 2, 3, 4, 5, 6])
     vehicle.set_mode(OWN_MODE[fake])
-    assert "switched it to Soar" in flight.run_until(HandedOver).reason
+    assert "switched it to Soar" in taken(flight)
 
 
 @EITHER
@@ -79,7 +86,7 @@ def test_who_tells_no_modes_is_asked_once_and_known_by_numbers(fake: type[FakeCo
     assert len(vehicle.commands(ASK)) == 1
     vehicle.set_mode(OWN_MODE[fake])
     number = "105" if fake is FakeCopter else "4.11"
-    assert f"switched it to mode {number}" in flight.run_until(HandedOver).reason
+    assert f"switched it to mode {number}" in taken(flight)
 
 
 def test_a_lost_answer_costs_one_name() -> None:
@@ -106,7 +113,7 @@ def test_modes_that_changed_are_asked_for_again() -> None:
     flight.run(2.0)
     assert len(vehicle.commands(ASK)) == 2
     vehicle.set_mode(OWN_MODE[FakePx4])
-    assert "switched it to Glide" in flight.run_until(HandedOver).reason
+    assert "switched it to Glide" in taken(flight)
 
 
 @pytest.mark.parametrize(
@@ -117,4 +124,4 @@ def test_a_mode_that_nobody_asked_for_is_a_failsafes(intended: int, who: str) ->
     flight = BridgeFlight(vehicle).flying()
     vehicle.say(later_dialect.MAVLink_current_mode_message(5, vehicle.return_mode, intended))
     vehicle.set_mode(vehicle.return_mode)
-    assert flight.run_until(HandedOver).reason.startswith(f"{who}")
+    assert taken(flight).startswith(f"{who}")

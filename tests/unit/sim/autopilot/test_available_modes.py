@@ -11,8 +11,10 @@ from pymavlink.dialects.v20 import development as later_dialect
 
 from sim.autopilot.available_modes import available_modes
 from sim.autopilot.firmware.ardupilot import ArduCopterModel
+from sim.autopilot.firmware.ardurover import ArduRoverModel
 from sim.autopilot.firmware.model import FirmwareModel
 from sim.autopilot.firmware.px4 import Px4Model
+from sim.autopilot.firmware.quadplane import QuadPlaneModel
 
 
 def told(model: FirmwareModel, asked: float) -> list[Any]:
@@ -21,10 +23,19 @@ def told(model: FirmwareModel, asked: float) -> list[Any]:
     return [reader.decode(bytearray(m.pack(sender))) for m in available_modes(model, asked)]
 
 
-def test_arducopter_tells_the_first_alone_and_each_by_its_number() -> None:
-    model = ArduCopterModel()
+@pytest.mark.parametrize(
+    ("model", "name", "number"),
+    [
+        (ArduCopterModel(), "Auto", 3),
+        (ArduRoverModel(), "Manual", 0),
+        (QuadPlaneModel(), "Manual", 0),
+    ],
+)
+def test_ardupilot_tells_the_first_alone_and_each_by_its_number(
+    model: FirmwareModel, name: str, number: int
+) -> None:
     (first,) = told(model, 0.0)
-    assert (first.mode_name, first.custom_mode, first.mode_index) == ("Auto", 3, 1)
+    assert (first.mode_name, first.custom_mode, first.mode_index) == (name, number, 1)
     every = [each for n in range(1, first.number_modes + 1) for each in told(model, float(n))]
     assert [each.mode_index for each in every] == list(range(1, len(model.mode_names) + 1))
     assert {each.custom_mode for each in every} == set(model.mode_names)
