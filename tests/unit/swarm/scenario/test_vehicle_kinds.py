@@ -12,6 +12,9 @@ from swarm.model.layers import FlightLayers
 from swarm.model.mission import kinds_of
 from swarm.model.vehicles import VehicleKind
 from swarm.protocol.board_arrays import fleet_of
+from swarm.protocol.codec import Codec
+from swarm.protocol.encoding import encode
+from swarm.protocol.messages import Message, Stamp
 from swarm.runtime.errors import InputError
 from swarm.scenario.read import build_mission
 from swarm.scenario.write import format_scenario
@@ -93,6 +96,10 @@ def test_a_file_that_is_written_says_the_same() -> None:
 
 def test_agents_are_told_what_they_fly() -> None:
     brief = mission_config_of(mission(), FlightLayers(), 1)
+    said = encode(Message("mixed", "coordinator", Stamp(1, 1), brief))
+    heard = Codec("mixed").decode("swarm/mixed/brief", said)
+    assert heard is not None
+    assert heard.body == brief
     told = fleet_of(brief)
     assert [uav.vehicle for uav in told] == [uav.vehicle for uav in mission().uavs]
     assert told[2].turn_radius_m == pytest.approx(70.0)

@@ -40,9 +40,11 @@ class Speaker:
         return self
 
 
-def heartbeat(*, armed: bool = False, autopilot: int = 3, state: int = 3) -> Any:
+def heartbeat(
+    *, armed: bool = False, autopilot: int = 3, state: int = 3, vehicle_type: int = 2
+) -> Any:
     mode = mavlink.MAV_MODE_FLAG_SAFETY_ARMED if armed else 0
-    return mavlink.MAVLink_heartbeat_message(2, autopilot, mode, 0, state, 3)
+    return mavlink.MAVLink_heartbeat_message(vehicle_type, autopilot, mode, 0, state, 3)
 
 
 def sys_status(*, prearm: bool = True, battery: int = 87) -> Any:
@@ -104,6 +106,30 @@ def test_a_ready_vehicle_is_told_with_all_it_says() -> None:
     assert told[f"{NAME} time"].text == "its clock and this one differ by 0.25 s"
     assert told[f"{NAME} link"].text == "8 frames, 0 lost (0.0%)"
     assert told[f"{NAME} failsafes"].text == "if its agent dies it returns"
+
+
+@pytest.mark.parametrize(
+    ("vehicle_type", "says"),
+    [(10, "a rover: keeps no distance from others"), (22, "a quadplane: passes its targets")],
+)
+def test_what_a_vehicle_is_not_flown_with_is_one_line(vehicle_type: int, says: str) -> None:
+    told = found(Speaker().say(heartbeat(vehicle_type=vehicle_type)))
+    assert told[f"{NAME} kind"].text.startswith(says)
+    assert "\n" not in told[f"{NAME} kind"].text
+    assert f"{NAME} kind" not in found(Speaker().say(heartbeat()))
+
+
+def test_a_circle_is_told_among_its_limits() -> None:
+    speaker = Speaker().say(heartbeat(vehicle_type=22), heartbeat(vehicle_type=22))
+    assert found(speaker.say(*parameters(WP_LOITER_RAD=60)))[f"{NAME} legs"].text == (
+        "WP_LOITER_RAD 60 m"
+    )
+
+
+def test_a_plane_without_rotors_fails_with_what_to_set() -> None:
+    told = found(Speaker().say(heartbeat(vehicle_type=1)))[NAME]
+    assert told.state is CheckState.FAILS
+    assert "set Q_MAV_TYPE 22" in told.text
 
 
 def test_what_it_does_without_its_agent_is_told_with_what_would_bring_it_home() -> None:
