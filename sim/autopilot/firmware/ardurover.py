@@ -42,7 +42,12 @@ _RENAMED = {
     "PSC_JERK_NE": "WP_JERK",
     "WP_RADIUS_M": "WP_RADIUS",
 }
-_OF_COPTERS = frozenset({"WP_JERK", "WP_ACC_CNR", "ATC_ANGLE_MAX", "AUTO_OPTIONS", "DISARM_DELAY"})
+_OF_COPTERS = frozenset(
+    {
+        *("WP_JERK", "WP_ACC_CNR", "WP_SPD_UP", "LAND_SPD_MS", "ATC_ANGLE_MAX", "AUTO_OPTIONS"),
+        *("DISARM_DELAY", "FENCE_AUTOENABLE", "RTL_ALT_M", "RTL_LOIT_TIME"),
+    }
+)
 _GROUND_LOST = {1: FlightMode.RTL, 2: FlightMode.HOLD, 3: FlightMode.RTL, 4: FlightMode.HOLD}
 """By FS_ACTION; SmartRTL is not simulated."""
 _FENCE_MODES = {1: FlightMode.RTL, 2: FlightMode.HOLD, 3: FlightMode.RTL, 4: FlightMode.HOLD}

@@ -136,7 +136,8 @@ def _zones(mission: Mission, problem: FieldProblem) -> Iterator[CheckFinding]:
         return
     layers = layers_over(mission.terrain)
     heights_m = [
-        layers.layer_m(number) + uav.position_enu_m[2] for number, uav in enumerate(mission.uavs)
+        layers.layer_of_m(uav.vehicle, number) + uav.position_enu_m[2]
+        for number, uav in enumerate(mission.uavs)
     ]
     bounds_m = [mission.band_m] if mission.band_m else [(up_m, up_m) for up_m in heights_m]
     idle = [zone.id for zone in mission.zones if not any(zone.concerns(*pair) for pair in bounds_m)]

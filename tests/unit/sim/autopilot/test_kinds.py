@@ -1,0 +1,146 @@
+"""Simulated rovers and QuadPlanes say and refuse what ArduPilot's code of theirs does."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from pymavlink.dialects.v20 import ardupilotmega as mavlink
+
+from sim.autopilot.config import VehicleConfig, fleet_of
+from sim.autopilot.firmware import SIMULATED, FirmwareModelName, check_simulated, firmware_model
+from sim.autopilot.flight import FlightMode
+from swarm.model.vehicles import VehicleKind
+from swarm.runtime.errors import InputError
+from swarm.scenario import load_scenario
+from swarm.scenario.files import resolve_scenario
+from tests.support.ground_station import GroundStation, ground_station, only
+
+ROVER, PLANE = VehicleKind.ROVER, VehicleKind.QUADPLANE
+GUIDED, HOLD, RTL, QRTL = 15, 4, 11, 21
+EXTENDED, HEARTBEAT = mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, mavlink.MAVLINK_MSG_ID_HEARTBEAT
+ACCEPTED, UNSUPPORTED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_UNSUPPORTED
+
+
+def station(kind: VehicleKind) -> GroundStation:
+    """With a vehicle that is ready."""
+    flavour = firmware_model(FirmwareModelName.ARDUPILOT, kind)
+    circle_m = 60.0 if kind is PLANE else None
+    station = ground_station(flavour, vehicle=kind, circle_m=circle_m, cruise_m_s=10.0)
+    station.wait(5.0)
+    return station
+
+
+def armed(kind: VehicleKind) -> GroundStation:
+    """Armed, in GUIDED."""
+    found = station(kind)
+    assert found.set_mode(GUIDED) == ACCEPTED
+    assert found.arm() == ACCEPTED
+    return found
+
+
+def landed_state(station: GroundStation) -> int:
+    station.command(mavlink.MAV_CMD_REQUEST_MESSAGE, EXTENDED)
+    return int(only(station.heard, "EXTENDED_SYS_STATE")[-1].landed_state)
+
+
+@pytest.mark.parametrize(("kind", "vehicle_type"), [(ROVER, 10), (PLANE, 22)])
+def test_it_says_what_it_is(kind: VehicleKind, vehicle_type: int) -> None:
+    said = only(station(kind).heard, "HEARTBEAT")
+    assert {beat.type for beat in said} == {vehicle_type}
+
+
+def test_a_rover_has_no_landed_state_and_no_takeoff() -> None:
+    rover = armed(ROVER)
+    assert landed_state(rover) == mavlink.MAV_LANDED_STATE_UNDEFINED
+    assert rover.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 10.0) == UNSUPPORTED
+
+
+def test_a_rover_stands_by_in_hold_alone() -> None:
+    rover = station(ROVER)
+    assert only(rover.heard, "HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_ACTIVE
+    assert rover.set_mode(HOLD) == ACCEPTED
+    rover.wait(1.1)
+    assert only(rover.heard, "HEARTBEAT")[-1].system_status == mavlink.MAV_STATE_STANDBY
+
+
+def test_a_rover_drives_on_the_ground_and_stays_armed_at_home() -> None:
+    rover = armed(ROVER)
+    rover.wait(30.0)
+    assert rover.vehicle.pilot.armed  # nothing disarms it
+    assert rover.reposition(50.0, 0.0, 30.0) == ACCEPTED
+    rover.wait(6.0)
+    assert rover.position_enu_m == pytest.approx((50.0, 0.0, 0.0), abs=0.02)
+    assert rover.set_mode(RTL) == ACCEPTED
+    rover.wait(20.0)
+    assert rover.position_enu_m == pytest.approx((0.0, 0.0, 0.0), abs=0.02)
+    assert rover.vehicle.pilot.armed
+    assert rover.vehicle.pilot.mode is FlightMode.RTL
+
+
+def test_a_rover_is_disarmed_under_way_and_stands() -> None:
+    rover = armed(ROVER)
+    rover.reposition(50.0, 0.0, 0.0)
+    rover.wait(2.0)
+    assert rover.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0) == ACCEPTED
+    here_m = rover.position_enu_m
+    rover.wait(9.0)
+    assert rover.position_enu_m == here_m
+    assert here_m[2] == 0.0
+
+
+def test_a_plane_rises_circles_and_lands_upright_at_home() -> None:
+    plane = armed(PLANE)
+    assert plane.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, 0, 0, 0, 20.0) == ACCEPTED
+    plane.wait(9.0)
+    assert plane.position_enu_m == pytest.approx((0.0, 0.0, 20.0))
+    assert landed_state(plane) == mavlink.MAV_LANDED_STATE_IN_AIR
+    plane.reposition(300.0, 0.0, 20.0)
+    for _ in range(4):
+        plane.wait(35.0)
+        assert math.dist(plane.position_enu_m[:2], (300.0, 0.0)) == pytest.approx(60.0, abs=0.02)
+    assert plane.set_mode(QRTL) == ACCEPTED
+    plane.wait(90.0)
+    assert plane.position_enu_m == pytest.approx((0.0, 0.0, 0.0))
+    assert not plane.vehicle.pilot.armed
+
+
+@pytest.mark.parametrize(
+    ("kind", "has", "lacks"),
+    [
+        (ROVER, {"WP_SPEED", "WP_ACCEL", "ATC_ACCEL_MAX", "FS_ACTION"}, {"WP_SPD", "RTL_ALT_M"}),
+        (PLANE, {"WP_LOITER_RAD", "Q_RTL_MODE", "FS_LONG_ACTN"}, {"FS_GCS_ENABLE", "WP_SPD"}),
+    ],
+)
+def test_its_parameters_have_the_names_of_its_kind(
+    kind: VehicleKind, has: set[str], lacks: set[str]
+) -> None:
+    config = VehicleConfig(1, vehicle=kind, circle_m=60.0 if kind is PLANE else None)
+    names = {
+        each.name for each in firmware_model(FirmwareModelName.ARDUPILOT, kind).parameters(config)
+    }
+    assert has <= names
+    assert not lacks & names
+
+
+def test_only_what_cannot_stay_has_a_circle_and_flies_in_still_air() -> None:
+    with pytest.raises(ValueError, match="has a circle only where it cannot stay"):
+        VehicleConfig(1, circle_m=60.0)
+    with pytest.raises(ValueError, match="has a circle only where it cannot stay"):
+        VehicleConfig(1, vehicle=PLANE)
+
+
+def test_vehicles_of_a_fleet_are_what_the_scenario_says() -> None:
+    fleet = fleet_of(load_scenario(resolve_scenario("roundup")))
+    assert [each.config.vehicle for each in fleet] == list(VehicleKind)
+    assert [each.config.circle_m for each in fleet][:2] == [None, None]
+    assert fleet[2].config.circle_m == pytest.approx(60.0)
+    assert fleet[2].config.acceleration_m_s2 is None
+
+
+def test_px4_has_copters_alone() -> None:
+    assert SIMULATED[FirmwareModelName.PX4] == {VehicleKind.COPTER}
+    with pytest.raises(ValueError, match="no rover is simulated with px4"):
+        firmware_model(FirmwareModelName.PX4, ROVER)
+    with pytest.raises(InputError, match="--flavour: px4: no quadplane is simulated"):
+        check_simulated(FirmwareModelName.PX4, [VehicleKind.COPTER, PLANE], "--flavour")
