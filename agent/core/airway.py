@@ -368,7 +368,7 @@ class Airway:
         claims, expired, here = self._claims(), self._fleet.expired(), self._hover()
         fallback: tuple[int, ClaimedWay] | None = None
         for shift_m, corners in self._fleet.ways(
-            air, wish, here.shift_m, aside=wish is self._aside, waits=self._wish is not None
+            air, wish, here.shift_m, aside=wish is self._aside
         ):
             start = here.path_enu_m[0] if here.path_enu_m else corners[0]
             path = shifted_path(start, corners, shift_m, wish.end_enu_m)
@@ -435,10 +435,12 @@ class Airway:
             self._depart(wish)
             if now_s > wish.since_s and wish is not self._aside:
                 self.when_departed()
-            if wish is self._aside:
-                self._aside = None
-            else:
+            if wish is not self._aside:
                 self._wish = None
+            elif self._wish is not None:
+                end = self._told_way.path_enu_m[-1]
+                self._fleet.begin_at(self._wish, self._nominal(end))
+            self._aside = None
 
     def _depart(self, wish: Wish) -> None:
         """Send the vehicle along the way that is its own now."""

@@ -32,6 +32,8 @@ _OF_RESERVE = 0.25
 _ASIDE_M = (1.5, 3.0, 6.0, 12.0)
 """How far somebody steps aside, in separations."""
 _DIRECTIONS = 8
+_BESIDE_M = 0.1
+"""Who is farther from a place, seen from above, is beside it."""
 
 
 @dataclass(slots=True)
@@ -90,7 +92,7 @@ class FleetAir:
         return self._air if self._mission_view.me is not None else None
 
     def ways(
-        self, air: SharedAir, wish: Wish, now_shift_m: float, *, aside: bool, waits: bool
+        self, air: SharedAir, wish: Wish, now_shift_m: float, *, aside: bool
     ) -> Iterator[tuple[float, tuple[Point, ...]]]:
         """Shifts and corners of ways to what is wished, those that are nearest first.
 
@@ -99,7 +101,6 @@ class FleetAir:
             wish: what is to be flown.
             now_shift_m: how much higher than its own layer the UAV is.
             aside: it is to make room, wherever that leads.
-            waits: it has another wish, which begins above or below where it is.
         """
         me = self._mission_view.me
         if me is None:
@@ -119,8 +120,7 @@ class FleetAir:
         (east_m, north_m, up_m), *_ = wish.corners_enu_m
         others_m = [shift_m for shift_m in shifts_m if abs(shift_m - now_shift_m) > 1e-6]
         yield from ((shift_m, wish.corners_enu_m[:1]) for shift_m in others_m)
-        hilly = self._brief is not None and self._brief.terrain is not None
-        if waits or hilly:
+        if self._brief is not None and self._brief.terrain is not None:
             return
         for away in _ASIDE_M:
             for turn in range(_DIRECTIONS):
@@ -128,6 +128,17 @@ class FleetAir:
                 there = east_m + away_m * math.cos(angle), north_m + away_m * math.sin(angle), up_m
                 if self._is_clear(wish.corners_enu_m[0], there):
                     yield from ((shift_m, (wish.corners_enu_m[0], there)) for shift_m in shifts_m)
+
+    def begin_at(self, wish: Wish, place_enu_m: Point) -> None:
+        """The UAV, which has made room, waits there for its way [m; in its own layer].
+
+        Round the same corners if nothing is between it and the first of them, else it goes back.
+        """
+        here, *rest = wish.corners_enu_m
+        if math.dist(here[:2], place_enu_m[:2]) < _BESIDE_M:
+            return
+        back = wish.fixed or not rest or not self._is_clear(place_enu_m, rest[0])
+        wish.corners_enu_m = (place_enu_m, *([here] if back else []), *rest)
 
     def _is_clear(self, begin_enu_m: Point, end_enu_m: Point) -> bool:
         """Whether no zone is between the two, at whatever height."""
@@ -152,7 +163,7 @@ class FleetAir:
             for path in (air.wanted(uav, air.way(uav, claims)),)
             if len(path)
         ]
-        ways = list(self.ways(air, wish, here.shift_m, aside=False, waits=False))
+        ways = list(self.ways(air, wish, here.shift_m, aside=False))
         step_m = planned_apart_m(air.slabs.separation_m)
         higher_m = max(shift_m for shift_m, _ in ways) + step_m
         if not wish.fixed:

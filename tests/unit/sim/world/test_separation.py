@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from sim.faults.case import quick_plan
@@ -11,6 +13,7 @@ from sim.world.simulation import SimulatedMission, simulate_mission
 from sim.world.uncertainty import Uncertainty
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 
+NIGHT = pytest.mark.slow
 FOUR = [(0.0, 0.0), (100.0, 0.0), (0.0, 100.0), (100.0, 100.0)]
 """Starts; everybody's task is opposite."""
 
@@ -28,18 +31,46 @@ def crossing(layers: int) -> Mission:
     return Mission("crossing", 400.0, fleet, board, 0.0, separation_m=10.0, band_m=band_m)
 
 
+def exchange(seed: int) -> Mission:
+    """Two to six UAVs in one layer, each with the task at the start of another one."""
+    rng = np.random.default_rng([seed, 5])
+    count, half_m = int(rng.integers(2, 7)), float(rng.uniform(40.0, 80.0))
+    places: list[tuple[float, float, float]] = []
+    while len(places) < count:
+        east_m, north_m = rng.uniform(-half_m, half_m, 2).tolist()
+        place = east_m, north_m, 0.0
+        if all(math.dist(place, other) >= 24.0 for other in places):
+            places.append(place)
+    ends = np.roll(places, -int(rng.integers(1, count)), axis=0).tolist()
+    fleet = tuple(Uav(UavId(f"u{k}"), at, 10.0, {f"t{k}": 1.0}) for k, at in enumerate(places))
+    board = tuple(Task(TaskId(f"t{k}"), tuple(at), 1.0) for k, at in enumerate(ends))
+    return Mission("exchange", 600.0, fleet, board, separation_m=10.0, band_m=(30.0, 30.5))
+
+
 def fly(mission: Mission) -> SimulatedMission:
     return simulate_mission(
         mission, method="greedy", seed=1, uncertainty=Uncertainty(), planner=quick_plan
     )
 
 
-@pytest.mark.parametrize("layers", [2, 4])
+@pytest.mark.parametrize("layers", [1, 2, 4])
 def test_who_would_meet_in_the_middle_keeps_the_distance_and_all_is_done(layers: int) -> None:
     flown = fly(crossing(layers))
     nearest_m = flown.world.closest_approach_m()
 
     assert sorted(flown.result.done) == ["t0", "t1", "t2", "t3"]
+    assert nearest_m is not None
+    assert nearest_m >= 10.0 - 1e-6
+
+
+@pytest.mark.parametrize("seed", [*range(3), *(pytest.param(s, marks=NIGHT) for s in range(3, 20))])
+def test_in_one_layer_all_change_places(seed: int) -> None:
+    """Everybody's task is where another one hovers, who can't leave before somebody has."""
+    mission = exchange(seed)
+    flown = fly(mission)
+    nearest_m = flown.world.closest_approach_m()
+
+    assert sorted(flown.result.done) == sorted(task.id for task in mission.tasks)
     assert nearest_m is not None
     assert nearest_m >= 10.0 - 1e-6
 
