@@ -55,7 +55,7 @@ test-computed: $(VENV)/.installed-dev
 	status=$$?; cat $(COMPUTED); exit $$status
 
 test-processes: $(VENV)/.installed-dev browser
-	$(BIN)/python -m pytest -n 6 --dist worksteal $(TESTED) tests/contract tests/process tests/sitl
+	$(BIN)/python -m pytest -n 8 --dist worksteal $(TESTED) tests/contract tests/process tests/sitl
 
 # The dashboard is tested in a real browser: Chromium under one of these names.
 CHROMIUM := chromium chromium-browser google-chrome
@@ -114,19 +114,22 @@ sanitize: $(VENV)/.installed-dev
 		PYTHONPATH="$$($(CURDIR)/$(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')" \
 		$(CURDIR)/$(BIN)/python -S -m pytest -q --capture sys --timeout 600 tests/unit/swarm/kernels
 
+# Bytecode is written by whoever imports a module first: of all the modules of all packages few are.
+PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
+
 # The demo needs no extra; a dashboard, a plot or a recording is what one asks for next.
 $(VENV)/.installed: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python
 	@echo "installing into $(VENV), and compiling the kernels: two or three minutes, in silence"
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[ground]'
+	$(PIP_INSTALL) --editable '.[ground]'
 	@touch $@
 
 $(VENV)/.installed-dev: pyproject.toml swarm/__init__.py $(KERNELS) | $(VENV)/bin/python
 	@echo "installing into $(VENV) all that tests need, too: some minutes, in silence"
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev]'
+	$(PIP_INSTALL) --editable '.[dev]'
 	@touch $@ $(VENV)/.installed
 
 $(VENV)/.installed-release: $(VENV)/.installed-dev
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable '.[dev,release]'
+	$(PIP_INSTALL) --editable '.[dev,release]'
 	@touch $@
 
 # The same commit gives the same bytes on every day: files carry the time of the commit.

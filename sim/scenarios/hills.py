@@ -21,12 +21,15 @@ _SIDE = 3601
 _ALONG = np.arange(_SIDE) / (_SIDE - 1)
 
 
-def hills_m() -> npt.NDArray[np.float64]:
-    """(3601, 3601) heights above mean sea level, from north to south and west to east [m]."""
+def hills_m(rows: slice = slice(None), columns: slice = slice(None)) -> npt.NDArray[np.float64]:
+    """Heights above mean sea level of these of 3601 rows and columns [m].
+
+    Rows go from north to south, columns from west to east.
+    """
     origin = DEFAULT_ORIGIN
     degree_m = enu_from_wgs84(origin, origin.lat_deg + 1.0, origin.lon_deg + 1.0, 0.0)
-    east_m = (8.0 + _ALONG - origin.lon_deg)[None, :] * degree_m[0]
-    north_m = (48.0 - _ALONG - origin.lat_deg)[:, None] * degree_m[1]
+    east_m = (8.0 + _ALONG[columns] - origin.lon_deg)[None, :] * degree_m[0]
+    north_m = (48.0 - _ALONG[rows] - origin.lat_deg)[:, None] * degree_m[1]
     crest_m = 300.0 + 60.0 * np.sin(north_m / 200.0)
     falls = 1.0 + np.exp(np.clip(north_m / 150.0, -50.0, 50.0))
     high_m = (25.0 + 65.0 / falls) * np.exp(-((north_m / 2_000.0) ** 4))

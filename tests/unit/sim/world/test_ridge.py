@@ -13,6 +13,7 @@ from sim.scenarios.hills import FILE, hills_m
 from swarm.allocation.field import FieldProblem
 from swarm.allocation.legs.ground import ground_of
 from swarm.model import Mission, TaskId
+from swarm.model.frames import enu_from_wgs84
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
 from tests.support.bridged_fleet import ONE_DIAGONAL
@@ -30,11 +31,16 @@ def _ridge() -> Mission:
 
 def test_the_tile_is_what_its_module_makes(ridge: Mission) -> None:
     assert ridge.terrain is not None
+    assert ridge.origin is not None
     assert FILE.stat().st_size < 50_000
     row = round((48.0 - 47.397742) * 3600)
     column = round((8.545594 - 8.0) * 3600)
-    ground_m = ground_of(ridge.terrain).one_up_m(0.0, 0.0)
-    assert ground_m == pytest.approx(hills_m()[row, column] - 488.0, abs=1.5)
+    made_m = hills_m(slice(row, row + 9, 4), slice(column, column + 9, 4)) - 488.0
+    for south, east in np.ndindex(made_m.shape):
+        lat_deg, lon_deg = 48.0 - (row + 4 * south) / 3600, 8.0 + (column + 4 * east) / 3600
+        east_m, north_m, _ = enu_from_wgs84(ridge.origin, lat_deg, lon_deg, 488.0)
+        ground_m = ground_of(ridge.terrain).one_up_m(east_m, north_m)
+        assert ground_m == pytest.approx(made_m[south, east], abs=1.0)
 
 
 def test_all_planned_ways_keep_from_the_ground_and_tell_their_heights(ridge: Mission) -> None:
