@@ -51,7 +51,7 @@ COMPUTED := build/test-computed.txt
 test-computed: $(VENV)/.installed-dev
 	@mkdir -p $(dir $(COMPUTED))
 	@echo "tests/unit and tests/faults go on beside the checks and report at their end ($(COMPUTED))"
-	@$(BIN)/python -m pytest -n 2 $(TESTED) tests/unit tests/faults >$(COMPUTED) 2>&1; \
+	@$(BIN)/python -m pytest -n 2 --dist worksteal $(TESTED) tests/unit tests/faults >$(COMPUTED) 2>&1; \
 	status=$$?; cat $(COMPUTED); exit $$status
 
 test-processes: $(VENV)/.installed-dev browser

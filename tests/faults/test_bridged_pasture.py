@@ -18,7 +18,7 @@ from coordinator.operator.zone_edits import NewZone
 from sim.autopilot.firmware import FirmwareModelName
 from sim.world.settings import RestartMemory
 from swarm.model import Zone, ZoneId
-from tests.support.bridged_fleet import ONE_DIAGONAL, OTHER_DIAGONAL
+from tests.support.bridged_fleet import OTHER_DIAGONAL, long_flight
 from tests.support.bridged_pasture import (
     BARN,
     PLACES,
@@ -70,7 +70,7 @@ def draw_a_wall(fleet: PastureFleet, ahead_m: float) -> Zone:
     return Zone(ZoneId("wall"), polygon)
 
 
-@ONE_DIAGONAL
+@long_flight(FirmwareModelName.PX4, CommandStyle.MISSION)
 def test_a_zone_drawn_across_a_flown_path_is_flown_round(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -165,7 +165,7 @@ def test_a_base_that_a_dead_uav_blocks_is_used_again_only_if_the_operator_says_s
     fleet.assert_safe()
 
 
-@ONE_DIAGONAL
+@long_flight(FirmwareModelName.ARDUPILOT, CommandStyle.REPOSITION)
 def test_where_no_swap_is_confirmed_nobody_starts_and_with_the_word_all_goes_on(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:
@@ -201,7 +201,7 @@ def type_of_landing(fleet: PastureFleet, uav: str) -> type:
     return next(kind for kind in kinds if kind.__name__ in ("Landed", "Home"))
 
 
-@OTHER_DIAGONAL
+@long_flight(FirmwareModelName.PX4, CommandStyle.REPOSITION)
 def test_a_battery_that_drains_twice_as_fast_is_changed_in_time(
     flavour: FirmwareModelName, style: CommandStyle
 ) -> None:

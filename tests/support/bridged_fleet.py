@@ -68,6 +68,13 @@ ONE_DIAGONAL = _by_day(_ALIKE)
 """Every firmware and every style by day, all that they make together at night."""
 OTHER_DIAGONAL = _by_day([kind for kind in KINDS if kind not in _ALIKE])
 """The same with the other two by day: for every second test, so that each day flies all four."""
+
+
+def long_flight(flavour: FirmwareModelName, style: CommandStyle) -> pytest.MarkDecorator:
+    """That pair alone by day: for flights of many minutes, of which others fly the other pairs."""
+    return _by_day([(flavour, style)])
+
+
 LIMIT_S = 400.0
 _WITH_REASON = HandedOver | HandOverExplained | Refused | ReturnAdvised
 FIELD = Mission(

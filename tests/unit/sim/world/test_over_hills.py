@@ -26,7 +26,7 @@ from swarm.model import Mission
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
 from swarm.scenario.read import parse_scenario
-from tests.support.bridged_fleet import ONE_DIAGONAL, OTHER_DIAGONAL
+from tests.support.bridged_fleet import long_flight
 from tests.support.bridged_ridge import RidgeFleet
 
 BARN = """
@@ -119,7 +119,7 @@ def test_a_bridge_that_knows_the_ground_does_not_lead_into_it(
     assert led.vehicle.pilot().armed
 
 
-@ONE_DIAGONAL
+@long_flight(FirmwareModelName.ARDUPILOT, CommandStyle.REPOSITION)
 def test_batteries_are_changed_up_the_slope(
     flavour: FirmwareModelName, style: CommandStyle, with_base: Mission
 ) -> None:
@@ -138,7 +138,7 @@ def test_batteries_are_changed_up_the_slope(
     assert fleet.lowest_m >= with_base.terrain.clearance_m, fleet.lowest_at
 
 
-@OTHER_DIAGONAL
+@long_flight(FirmwareModelName.PX4, CommandStyle.REPOSITION)
 def test_a_zone_drawn_over_a_uav_over_hills_is_left_above_the_ground(
     flavour: FirmwareModelName, style: CommandStyle, ridge: Mission
 ) -> None:

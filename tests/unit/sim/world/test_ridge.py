@@ -16,7 +16,7 @@ from swarm.model import Mission, TaskId
 from swarm.model.frames import enu_from_wgs84
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
-from tests.support.bridged_fleet import ONE_DIAGONAL
+from tests.support.bridged_fleet import long_flight
 from tests.support.bridged_ridge import RidgeFleet
 from tests.support.fleet_builders import plan_for
 from tests.support.hills import above_m
@@ -62,7 +62,7 @@ def test_climbing_takes_time(ridge: Mission) -> None:
     assert over.leg_s[0, 0, behind] > flat.leg_s[0, 0, behind] + 1.0
 
 
-@ONE_DIAGONAL
+@long_flight(FirmwareModelName.PX4, CommandStyle.MISSION)
 def test_nobody_comes_too_near_to_the_ground_and_lines_are_followed(
     flavour: FirmwareModelName, style: CommandStyle, ridge: Mission
 ) -> None:
