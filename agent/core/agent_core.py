@@ -465,8 +465,8 @@ class AgentCore(AgentPart):
 
     def _settle(self, now_s: float) -> None:
         """Ask for ways, grant those of others, and set off on what is granted."""
-        for refused in self._airway.settle(now_s):
-            self._commander.hear(refused, now_s)
+        for report in self._airway.settle(now_s):
+            self._commander.hear(report, now_s)
             self._airway.settle(now_s)
         if (restated := self._airway.restated()) is not None:
             self._say(restated)

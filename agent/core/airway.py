@@ -12,12 +12,12 @@ In any other mission orders pass as they are.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
-from agent.core.fleet_air import FleetAir, Wish
+from agent.core.fleet_air import GIVES_UP_S, FleetAir, Wish
 from agent.core.interface import (
     Action,
     Arrived,
@@ -31,6 +31,7 @@ from agent.core.interface import (
     Prepare,
     Refused,
     Return,
+    ReturnAdvised,
     Telemetry,
     VehicleOrder,
     VehicleReady,
@@ -40,14 +41,14 @@ from swarm.protocol.events import LogLine
 from swarm.protocol.fields import Point
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
-from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
+from swarm.protocol.uav_messages import BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, strength
-from swarm.separation.shifted import hover_shift_m, length_m, nominal, shifted_path
+from swarm.separation.shifted import hovering, left_of_way, length_m, nominal, shifted_path
+from swarm.separation.slabs import apart
+from swarm.separation.straight_pieces import not_flown
 
 STOP_LEG = 0
 """Of orders that are this module's own; those of the core are numbered from 1."""
-GIVES_UP_S = 10.0
-"""How long a UAV waits for a way to a task before it looks for another task [s]."""
 _LONGER_M = 0.5
 """A way is as it was reckoned, to so much [m]."""
 _ASIDE_PATIENCE = 4.0
@@ -108,6 +109,8 @@ class Airway:
         """What the last look rested on."""
         self._left_base = False
         """Whether it has taken off from there since it last said anything."""
+        self._comes_down = False
+        """Whether it lands where it is, whatever home it is told to return to."""
         self._looks_again = False
         """Whether somebody may still have to be let by."""
         self._room_at_s = -math.inf
@@ -118,7 +121,8 @@ class Airway:
 
     def hear(self, event: Event) -> Event:
         """What the vehicle says, as the core is to hear it: in the layer of the brief."""
-        if self._shared is None:
+        air = self._shared
+        if air is None:
             return event
         match event:
             case Telemetry(position_enu_m=place):
@@ -134,7 +138,7 @@ class Airway:
             case Landed() | Home():
                 self._aloft = self._moves = self._stops = False
                 self._lifts_enu_m = None
-                heir = self._fleet.heir() if isinstance(event, Home) else None
+                heir = self._fleet.heir(air) if isinstance(event, Home) else None
                 self._way = replace(
                     self._told_way, path_enu_m=(), flies=False, grounded=True, heir=heir
                 )
@@ -181,11 +185,14 @@ class Airway:
                 self._stops = False
                 self._drop_wish()
             return
-        corners = self._corners(order)
-        if corners is None:
+        here, returns = self._here(), isinstance(order, Return)
+        if isinstance(order, Return) and self._comes_down and self._aloft:
+            order, here = replace(order, path_enu_m=(), via_enu_m=self._place, land=True), None
+        if here is None or (returns and not self._aloft):
             self._actions.append(OrderVehicle(order))
             self._drop_wish()
             return
+        corners = self._fleet.corners(order, here)
         # Home, a vehicle goes down to its own layer above its start by itself.
         own_height |= isinstance(order, Return) and not order.land
         now_s, high = self._mission_view.now_s, self._at_own_height
@@ -193,29 +200,24 @@ class Airway:
         self._aside = None
         if not self._aloft:
             self._stands_at = self._stands_at or self._fleet.standing()
-        if self._moves and self._aloft and not self._stops:
-            self._stop()
+        elif self._moves and not self._stops:
+            left = (
+                None
+                if self._own_height != own_height or self._place is None
+                else left_of_way(self._told_way, self._place, corners, self._wish.end_enu_m)
+            )
+            if left is None:
+                self._stop()
+            else:
+                self._way = left
+                self._depart(self._wish)
+                self._wish = None
 
     def _drop_wish(self) -> None:
         """Nothing is asked for any more."""
         self._wish = self._aside = None
         if self._way is not None and not self._way.flies:
-            self._way = self._hover()
-
-    def _corners(self, order: GoTo | Return) -> tuple[Point, ...] | None:
-        """Of its way in the own layer; None: it leads nowhere."""
-        here = self._here()
-        if here is None:
-            return None
-        if isinstance(order, GoTo):
-            return (here, *order.via_enu_m, order.position_enu_m)
-        if not self._aloft:
-            return None
-        me = self._mission_view.me
-        corners = [*order.path_enu_m, *([] if order.via_enu_m is None else [order.via_enu_m])]
-        if not order.land and me is not None:
-            corners.append(self._mission_view.in_layer(me.position_enu_m))
-        return (here, *corners)
+            self._way = hovering(self._told_way)
 
     def _here(self) -> Point | None:
         """Where the vehicle is, or will be in the air, in its own layer; None if not known."""
@@ -255,22 +257,18 @@ class Airway:
         if self._shared is None:
             return claim
         if self._stands_at is not None and claim.base is None:
-            base, stage = self._stands_at  # it holds its slot until it really takes off
-            claim = replace(claim, base=base, stage=stage)
-            if claim.task is not None:
-                departs_s = self._mission_view.mission_s(self._mission_view.now_s)
-                claim = replace(claim, departs_s=departs_s)
+            claim = self._fleet.still_standing(claim, *self._stands_at)
         made_of = self._told_way, self._granted, self._keeps
         if made_of != self._made_of:  # most words are about something else
             self._made_of = made_of
             self._whole = replace(made_of[0], grants=dict(self._granted), keeps=self._keeps)
         return claim if claim.way is self._whole else replace(claim, way=self._whole)
 
-    def settle(self, now_s: float) -> list[Refused]:
+    def settle(self, now_s: float) -> Sequence[Refused | ReturnAdvised]:
         """What follows from the claims: whom to grant, where to go, and what is told of it.
 
         Returns:
-            Orders that are given up, since no way becomes free.
+            Orders that are given up, since no way becomes free, or advice to land where it is.
         """
         air, claim = self._shared, self._replica.claims.get(self._uav)
         if air is None or claim is None:
@@ -278,12 +276,12 @@ class Airway:
         if not self._has_changed(now_s):
             return []
         self._fleet.note_losses()
-        refused = self._press(air, now_s)
+        given_up = self._press(air, now_s)
         others = self._fleet.heard(), self._fleet.expired()
         self._keeps = air.inherited(self._uav, self._claims(), *others)
         self._granted = air.granted(self._uav, self._claims(), *others)
         self._depart_if_granted(air, now_s)
-        return refused
+        return given_up
 
     def _has_changed(self, now_s: float) -> bool:
         """Whether anything is new since the last look: most steps are about something else."""
@@ -309,48 +307,53 @@ class Airway:
     def next_deadline_s(self) -> float | None:
         """When `settle` will next have something to do."""
         wish = self._aside or self._wish
-        if self._stops or (self._moves and self._aloft):
+        if self._stops:
             return None
         again_s = self._room_at_s if self._looks_again else None
-        return again_s if wish is None else wish.retry_at_s
+        return again_s if wish is None or (self._moves and self._aloft) else wish.retry_at_s
 
     # -- asking -----------------------------------------------------------------------------------
 
-    def _press(self, air: SharedAir, now_s: float) -> list[Refused]:
+    def _press(self, air: SharedAir, now_s: float) -> Sequence[Refused | ReturnAdvised]:
         """Ask for what is wished, give way to who is stronger, make room, or give up."""
-        if self._stops or (self._moves and self._aloft):
+        if self._stops:
             return []
         self._looks_again = self._aside is None and self._room_at_s > now_s
         if self._aside is None and not self._looks_again:
             self._room_at_s = now_s + self._retry_s
-            self._looks_again = self._make_room(air, now_s)
+            flies = self._moves and self._aloft
+            self._looks_again = self._clear_behind(air) if flies else self._make_room(air, now_s)
+        if self._moves and self._aloft:
+            return []
         if self._aside is not None:
             if now_s - self._aside.since_s > _ASIDE_PATIENCE * self._retry_s:
-                self._aside, self._way = None, self._hover()
+                self._aside, self._way = None, hovering(self._told_way)
             else:
                 self._pursue(air, self._aside, now_s)
         wish = self._wish
         if wish is None or self._aside is not None:
             return []
-        waited_s = now_s - wish.since_s
-        if wish.asked or waited_s > GIVES_UP_S:
-            task = wish.order.task if isinstance(wish.order, GoTo) else None
-            spent = self._mission_view.mission_s(now_s) > self.sortie_end_s()
-            if task is not None and (waited_s > GIVES_UP_S or spent):
-                self._wish = None
-                self._way = self._hover()
-                self._actions.append(LogLine("no way", {"task": task}))
-                return [Refused(wish.order, "no way there becomes free", passes=True)]
-            end_s = self.sortie_end_s()
-            if task is None and self._aloft and self._fleet.must_go(wish, end_s, self._retry_s):
-                self._actions.append(LogLine("flies where it may meet others", {}))
-                shift_m, path = self._fleet.emptiest_way(air, wish, self._hover(), self._claims())
-                self._way = ClaimedWay(self._number(), path, shift_m=shift_m)
-                self._depart(wish)
-                self._wish = None
-                return []
+        waited_s, end_s = now_s - wish.since_s, self.sortie_end_s()
+        spent = wish.asked and self._mission_view.mission_s(now_s) > end_s
+        if wish.task is not None and (waited_s > GIVES_UP_S or spent):
+            self._wish = None
+            self._way = hovering(self._told_way)
+            self._actions.append(LogLine("no way", {"task": wish.task}))
+            return [Refused(wish.order, "no way there becomes free", passes=True)]
+        if wish.task is None and self._aloft and self._fleet.must_land(wish, end_s, self._retry_s):
+            return self._come_down(wish)
         self._pursue(air, wish, now_s)
         return []
+
+    def _come_down(self, wish: Wish) -> list[ReturnAdvised]:
+        """Land where it hovers: above and below that nobody else is granted anything."""
+        self._comes_down = True
+        self._drop_wish()
+        self._actions.append(LogLine("lands where it is", {}))
+        if isinstance(wish.order, Return):
+            self.order(wish.order)
+            return []
+        return [ReturnAdvised("no way to where it could land becomes free")]
 
     def _pursue(self, air: SharedAir, wish: Wish, now_s: float) -> None:
         rival = self._fleet.stronger(air, wish, self._claims()) if wish.asked else None
@@ -365,14 +368,14 @@ class Airway:
 
         Of those it takes one through few slabs, where it needs few grants and keeps few from going.
         """
-        claims, expired, here = self._claims(), self._fleet.expired(), self._hover()
+        claims, expired, here = self._claims(), self._fleet.expired(), hovering(self._told_way)
         fallback: tuple[int, ClaimedWay] | None = None
         for shift_m, corners in self._fleet.ways(
             air, wish, here.shift_m, aside=wish is self._aside
         ):
             start = here.path_enu_m[0] if here.path_enu_m else corners[0]
             path = shifted_path(start, corners, shift_m, wish.end_enu_m)
-            if len(path) > MOST_CORNERS:
+            if self._aloft and not self._fleet.can_fly(wish, path, self.sortie_end_s()):
                 continue
             array = np.array(path)
             grounded = not self._aloft
@@ -406,10 +409,11 @@ class Airway:
 
         Gives whether there is anybody to step aside for.
         """
-        here = self._hover()
-        if self._moves or not self._aloft or not here.path_enu_m or not self._may_leave:
+        here, claims = hovering(self._told_way), self._claims()
+        works = self._wish is None and claims[self._uav].phase is not ClaimPhase.IDLE
+        if self._moves or not self._aloft or not here.path_enu_m or works:
             return False
-        claims, place = self._claims(), np.array(here.path_enu_m)
+        place = np.array(here.path_enu_m)
         for uav in air.in_the_way(self._uav, place, claims, self._fleet.expired()):
             if self._wish is not None and strength(self._uav, claims) < strength(uav, claims):
                 continue
@@ -418,12 +422,19 @@ class Airway:
             return True
         return False
 
-    @property
-    def _may_leave(self) -> bool:
-        """Whether it hovers for nothing but want of a task or of a way."""
-        claim = self._replica.claims.get(self._uav)
-        idle = claim is not None and claim.phase is ClaimPhase.IDLE
-        return idle or self._wish is not None
+    def _clear_behind(self, air: SharedAir) -> bool:
+        """Give back what it has flown of its way, once somebody who asks needs no more than that.
+
+        Gives whether anybody asks for any of the way.
+        """
+        way, claims = self._told_way, self._claims()
+        path, place = way.path_enu_m, self._place
+        asking = air.in_the_way(self._uav, np.array(path), claims, self._fleet.expired())
+        left = path if place is None else not_flown(path, place)
+        rest = np.array(left)
+        if any(apart(air.slabs, rest, air.wanted(uav, air.way(uav, claims))) for uav in asking):
+            self._way = replace(way, path_enu_m=left)
+        return bool(asking)
 
     # -- setting off ------------------------------------------------------------------------------
 
@@ -474,15 +485,6 @@ class Airway:
         flies = self._aloft and me is not None
         start = (self._mission_view.in_layer(me.position_enu_m),) if flies and me else ()
         return ClaimedWay(0, start, flies, not flies)
-
-    def _hover(self) -> ClaimedWay:
-        """Staying where its way begins, or where it is."""
-        way = self._told_way
-        if way.flies:
-            return replace(way, path_enu_m=way.path_enu_m[-1:])
-        here = () if way.grounded else way.path_enu_m[:1]
-        shift_m = 0.0 if way.grounded else hover_shift_m(way)
-        return replace(way, path_enu_m=here, flies=bool(here), grounded=not here, shift_m=shift_m)
 
     def _number(self) -> int:
         mission_ms = round(1e3 * self._mission_view.mission_s(self._mission_view.now_s))

@@ -6,29 +6,40 @@ Leaves out: asking, granting and setting off (agent.core.airway).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from itertools import accumulate, pairwise
 
 import numpy as np
 
 from agent.core.interface import GoTo, Return
 from agent.core.mission_view import MissionView, Peers
+from swarm.allocation.problem import rest_to_rest_s
+from swarm.model import UavId
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
-from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
+from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimPhase
 from swarm.separation.shared_air import SharedAir, air_of_brief, is_home, strength
-from swarm.separation.shifted import length_m, shifted_path
-from swarm.separation.slabs import nearest_m, planned_apart_m
+from swarm.separation.shifted import length_m
+from swarm.separation.straight_pieces import thinned
 
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end, or is changed [s]."""
-LAST_RESORT_S = 300.0
-"""How long one that is to come home waits for a way before it comes without [s]."""
-_OF_RESERVE = 0.25
+GIVES_UP_S = 10.0
+"""How long a UAV waits for a way to a task before it looks for another task, or for one out of a
+zone before it lands there [s]."""
+PATIENT_S = 300.0
+"""How long one whose battery has no end waits for its way home before it lands where it is [s]."""
+_TRIES = 2.0
+"""How long it asks for a way home at least, in intervals at which it asks anew."""
+_OF_RESERVE = 0.5
 """Share of the reserve that a wait for the way home may use up."""
+_MOST_OF_RESERVE = 0.75
+"""Share of it that the wait and a climb on the way may use up together."""
+_TURNS = 2
+"""Corners that a way in another layer has more than one in the own layer, at most."""
 _ASIDE_M = (1.5, 3.0, 6.0, 12.0)
 """How far somebody steps aside, in separations."""
 _DIRECTIONS = 8
@@ -57,6 +68,11 @@ class Wish:
     """Whether the own claim asks for it."""
     yielded: set[tuple[str, int]] = field(default_factory=set)
     """Requests of others to which it has given way."""
+
+    @property
+    def task(self) -> str | None:
+        """To which task it leads."""
+        return self.order.task if isinstance(self.order, GoTo) else None
 
     @property
     def climbs(self) -> bool:
@@ -90,6 +106,17 @@ class FleetAir:
             self._brief = brief
             self._air = None if brief is None else air_of_brief(brief)
         return self._air if self._mission_view.me is not None else None
+
+    def corners(self, order: GoTo | Return, here_enu_m: Point) -> tuple[Point, ...]:
+        """Of the way of ``order`` in the own layer, from there [m]."""
+        me, corners = self._mission_view.me, [here_enu_m]
+        if isinstance(order, GoTo):
+            corners += [*order.via_enu_m, order.position_enu_m]
+        else:
+            corners += [*order.path_enu_m, *([] if order.via_enu_m is None else [order.via_enu_m])]
+            if not order.land and me is not None:
+                corners.append(self._mission_view.in_layer(me.position_enu_m))
+        return thinned(corners, MOST_CORNERS - _TURNS)
 
     def ways(
         self, air: SharedAir, wish: Wish, now_shift_m: float, *, aside: bool
@@ -148,52 +175,60 @@ class FleetAir:
         network = None if problem is None else problem.network
         return network is not None and network.is_clear(begin_enu_m, end_enu_m)
 
-    def emptiest_way(
-        self, air: SharedAir, wish: Wish, here: ClaimedWay, claims: Mapping[str, Claim]
-    ) -> tuple[float, tuple[Point, ...]]:
-        """Shift and path of the way home that keeps farthest from all that others take.
-
-        Above the highest layer only where none below keeps a separation.
-        """
-        expired = self.expired()
-        taken = [
-            path
-            for uav in claims
-            if uav != self._uav and uav not in expired
-            for path in (air.wanted(uav, air.way(uav, claims)),)
-            if len(path)
-        ]
-        ways = list(self.ways(air, wish, here.shift_m, aside=False))
-        step_m = planned_apart_m(air.slabs.separation_m)
-        higher_m = max(shift_m for shift_m, _ in ways) + step_m
-        if not wish.fixed:
-            ways += [(higher_m, ways[-1][1]), (higher_m + step_m, ways[-1][1])]
-        best: tuple[float, float, tuple[Point, ...]] | None = None
-        for shift_m, corners in ways:
-            path = shifted_path(here.path_enu_m[0], corners, shift_m, wish.end_enu_m)
-            mine = np.array(path)
-            near_m = min((nearest_m(mine, other, 0.5) for other in taken), default=math.inf)
-            room_m = min(near_m, air.slabs.separation_m + 0.5)
-            if len(path) <= MOST_CORNERS and (best is None or room_m > best[0]):
-                best = room_m, shift_m, path
-        return (0.0, here.path_enu_m) if best is None else best[1:]
-
-    def must_go(self, wish: Wish, sortie_end_s: float, retry_s: float) -> bool:
-        """Whether it would fall if it waited any longer: none of the reserve is left for that.
+    def sets_off_by_s(self, wish: Wish, sortie_end_s: float, climb_s: float = 0.0) -> float:
+        """Until when it can set off on its way home, or wait for it [s mission time].
 
         Args:
-            wish: for a way home.
+            wish: for that way.
             sortie_end_s: by when it must have landed, its reserve kept [s mission time].
-            retry_s: how long it takes until it looks again [s].
+            climb_s: what its way takes beside what was reckoned [s].
         """
         me = self._mission_view.me
         if me is None or me.endurance_s is None or math.isinf(sortie_end_s):
-            return self._mission_view.now_s - wish.since_s > LAST_RESORT_S
+            return self._mission_view.mission_s(wish.since_s) + PATIENT_S
         way_s = wish.takes_s
         if way_s is None:
             way_s = length_m(wish.corners_enu_m) / me.speed_m_s
-        falls_s = sortie_end_s + _OF_RESERVE * me.reserve_frac * me.endurance_s
-        return self._mission_s + way_s + retry_s > falls_s
+        return sortie_end_s + _OF_RESERVE * me.reserve_frac * me.endurance_s - way_s - climb_s
+
+    def can_fly(self, wish: Wish, path_enu_m: Sequence[Point], sortie_end_s: float) -> bool:
+        """Whether its battery lasts for a way home that climbs into another layer first."""
+        me = self._mission_view.me
+        if me is None or wish.task is not None:
+            return True
+        upright_m = [math.dist(a, b) for a, b in pairwise(path_enu_m) if a[:2] == b[:2]]
+        if not upright_m:
+            return True
+        climb_s = float(
+            rest_to_rest_s(
+                np.array(upright_m), me.speed_m_s, me.acceleration_m_s2 or math.inf
+            ).sum()
+        )
+        more_s = (_MOST_OF_RESERVE - _OF_RESERVE) * me.reserve_frac * (me.endurance_s or 0.0)
+        return self._mission_s <= self.sets_off_by_s(wish, sortie_end_s, climb_s) + more_s
+
+    def must_land(self, wish: Wish, sortie_end_s: float, retry_s: float) -> bool:
+        """Whether it must not wait any longer for a way home, or out of a zone.
+
+        Args:
+            wish: for that way.
+            sortie_end_s: by when it must have landed, its reserve kept [s mission time].
+            retry_s: how long it takes until it looks again [s].
+        """
+        waited_s = self._mission_view.now_s - wish.since_s
+        if waited_s <= _TRIES * retry_s:
+            return False
+        if self._mission_s + retry_s > self.sets_off_by_s(wish, sortie_end_s):
+            return True
+        return waited_s > GIVES_UP_S and self._is_in_zone()
+
+    def _is_in_zone(self) -> bool:
+        """Whether a zone has been drawn over it."""
+        problem, place = self._mission_view.board.field_problem, self._mission_view.place_enu_m
+        if not zones_in_force(self._replica) or problem is None or problem.network is None:
+            return False
+        row = problem.uav_ids.index(UavId(self._uav))
+        return place is not None and problem.network.way_out_m(row, place) is not None
 
     def standing(self) -> tuple[str, BaseStage] | None:
         """Base and stage of who stands there, by its own last word."""
@@ -202,6 +237,12 @@ class FleetAir:
         return (
             (claim.base, claim.stage) if stands and claim and claim.base and claim.stage else None
         )
+
+    def still_standing(self, claim: Claim, base: str, stage: BaseStage) -> Claim:
+        """``claim`` of who holds its slot until it really takes off."""
+        if claim.task is None:
+            return replace(claim, base=base, stage=stage)
+        return replace(claim, base=base, stage=stage, departs_s=self._mission_s)
 
     def _in_layer(self, wish: Wish, layer_m: float) -> tuple[Point, ...]:
         """The corners of a way with its ends in the layer: to be climbed to and left upright.
@@ -272,18 +313,23 @@ class FleetAir:
         """Whose requests count."""
         return {*self._peers.membership.present, self._uav}
 
-    def heir(self) -> str | None:
-        """Who is to keep this UAV's air: somebody who is heard, best one who takes part."""
-        claims = self._replica.claims
-        by_part: dict[bool, list[str]] = {True: [], False: []}
+    def heir(self, air: SharedAir) -> str | None:
+        """Who is to keep this UAV's air: somebody who is heard, best one who takes part.
+
+        Of these one with as few seats as can be beside this UAV's, so that the loss of one does not
+        shut what three keep.
+        """
+        claims, expired = self._replica.claims, self.expired()
         fleet = [] if self._brief is None else [uav.id for uav in self._brief.uavs]
         after = 1 + fleet.index(self._uav) if self._uav in fleet else 0
+        mine = air.stacks_of(self._uav, claims, expired)
+        found = []
         for uav in (*fleet[after:], *fleet[:after]):
             claim = claims.get(uav)
-            heard = uav != self._uav and self.reaches(uav)
-            if heard and claim is not None and not is_home(claim):
-                by_part[claim.phase is not ClaimPhase.OUT].append(uav)
-        return next(iter((*by_part[True], *by_part[False])), None)
+            if uav != self._uav and self.reaches(uav) and claim is not None and not is_home(claim):
+                beside = len(mine & air.stacks_of(uav, claims, expired))
+                found.append((claim.phase is ClaimPhase.OUT, beside, len(found), uav))
+        return min(found)[-1] if found else None
 
     @property
     def _mission_s(self) -> float:

@@ -13,10 +13,10 @@ Beside the invariants of the messages (sim.faults.message_log):
 - *disobeys*: no agent that knows of it takes tasks in an aborted mission, or though the
   operator's last word to its UAV was to hold or to come home;
 - *task lost*: in the end each task that was posted, or added by the operator, is done, failed,
-  withdrawn, or open with no UAV able to do it, or to find a way there that nobody took, that knew
-  of it before it left, and of a mission
+  withdrawn, or open with no UAV able to do it that knew of it before it left, and of a mission
   that had begun, and came home of its own accord; or the operator added it too late, when the
-  coordinator ended the mission;
+  coordinator ended the mission. Who was kept apart found no way there while somebody was lost or
+  not heard, or had to land where it was, was not able to do it;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
 - *too near*: no two UAVs in the air are nearer to each other than the mission's separation;
 - in the field those of `sim.faults.field_judge`, but for batteries of UAVs whose agents were no
@@ -57,6 +57,7 @@ from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoc
 from swarm.protocol.operator_commands import abort_command, newest_command, zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, StatusPhase
+from swarm.separation.shared_air import is_home
 
 SETTLED_S = 5.0
 """Calm for this long, the fleet must agree."""
@@ -84,7 +85,9 @@ class InvariantChecker:
         self._lives: dict[Process, int] = {}
         self._changed_s: dict[str, float] = {}
         self._without_way: set[tuple[str, str]] = set()
-        """UAV and task, to which it found no way that nobody took."""
+        """UAV and task, to which it found no way while air was shut by somebody who was missing."""
+        self._came_down: set[str] = set()
+        """UAVs that landed where they were, for want of a way home."""
         self._steps = 0
         self._steps_at_s = 0.0
         self._left_in_calm: set[str] = set()
@@ -165,7 +168,10 @@ class InvariantChecker:
             self.message_log.gave_up(process.name, str(released))
         if note.text == "no way" and "task" in note.fields:
             self.message_log.refused(process.name, str(note.fields["task"]))
-            self._without_way.add((process.name, str(note.fields["task"])))
+            if isinstance(process.core, AgentCore) and self._lacks_somebody(process, process.core):
+                self._without_way.add((process.name, str(note.fields["task"])))
+        if note.text == "lands where it is":
+            self._came_down.add(process.name)
         if note.text == "turns aside":
             self.message_log.turned_aside(self._now_s, process.name, str(note.fields["task"]))
             self._stop_if_broken()
@@ -285,7 +291,9 @@ class InvariantChecker:
         home = [
             uav
             for uav in world.mission.uavs
-            if world.finished.get(uav.id) == 0 and not message_log.sent_home(uav.id)
+            if world.finished.get(uav.id) == 0
+            and not message_log.sent_home(uav.id)
+            and uav.id not in self._came_down
         ]
         to_do = {
             uav: self._left_undone.get(uav, _on_board(core.replica))
@@ -354,6 +362,19 @@ class InvariantChecker:
         process = self._world.processes[uav]
         silent = process.over or process in self._injector.held_for_good
         return silent and uav not in self._world.finished
+
+    def _lacks_somebody(self, process: Process, core: AgentCore) -> bool:
+        """Whether any of the fleet is gone or not heard, and not known to be home.
+
+        Its air is shut, and its seats.
+        """
+        world, claims = self._world, core.replica.claims
+        others = (world.processes[uav] for uav in world.agents if uav != process.name)
+        return any(
+            not is_home(claims.get(other.name))
+            and (self._is_lost(other.name) or not self._network.joined(process, other))
+            for other in others
+        )
 
     def _drawn_over(self, uav: str, at_s: float) -> Iterator[Zone]:
         """Zones drawn in flight that may have kept ``uav`` from what it left undone then."""

@@ -95,17 +95,22 @@ class SharedAir:
                 continue
             way = self.way(other, claims)
             wanted = self.wanted(other, way)
-            if way.flies or grounded or not self._lets_by(path, wanted):
+            if way.flies or grounded or not self._lets_by(uav, path, wanted, claims):
                 if not apart(self.slabs, path, wanted, asked):
                     return False
             elif not apart(self.slabs, path, self.taken(other, way, granted=False), asked):
                 return False
         return True
 
-    def _lets_by(self, path: Path, wanted: Path) -> bool:
-        """Whether who hovers where ``path`` begins is in the way, and will not be at its end."""
-        here, there = path[:1], path[-1:]
-        return not apart(self.slabs, here, wanted) and apart(self.slabs, there, wanted)
+    def _lets_by(self, uav: str, path: Path, wanted: Path, claims: Mapping[str, Claim]) -> bool:
+        """Whether ``uav`` is in the way where ``path`` begins, and will not be at its end.
+
+        Nor will who lands there for good, wherever that is.
+        """
+        claim, here, there = claims.get(uav), path[:1], path[-1:]
+        lands = claim is not None and claim.phase is ClaimPhase.OUT
+        in_the_way = not apart(self.slabs, here, wanted)
+        return in_the_way and (lands or apart(self.slabs, there, wanted))
 
     # -- who keeps it ----------------------------------------------------------------------
 
@@ -114,6 +119,15 @@ class SharedAir:
     ) -> str | None:
         """Who sits on a seat; None: nobody is left in the air."""
         return self._line(seat, claims, expired)[-1]
+
+    def stacks_of(
+        self, uav: str, claims: Mapping[str, Claim], expired: Collection[str]
+    ) -> frozenset[int]:
+        """Stacks in which ``uav`` has a seat."""
+        seats = enumerate(self._stack_of)
+        return frozenset(
+            stack for seat, stack in seats if self.holder(seat, claims, expired) == uav
+        )
 
     def _line(
         self, seat: int, claims: Mapping[str, Claim], expired: Collection[str]
@@ -303,7 +317,9 @@ class SharedAir:
                 continue
             others = self._taken_by_others(uav, claims, binding, expired)
             before_it = (
-                other for other in waiting if way.grounded or not self._lets_by(path, other)
+                other
+                for other in waiting
+                if way.grounded or not self._lets_by(uav, path, other, claims)
             )
             if all(apart(self.slabs, path, each, asked & mine) for each in (*before_it, *others)):
                 grants[uav] = way.number
@@ -378,10 +394,12 @@ class SharedAir:
         return sorted(found, key=lambda each: strength(each, claims))
 
 
-def strength(uav: str, claims: Mapping[str, Claim]) -> tuple[float, str]:
-    """Sort key of who asks: who has waited longest goes first."""
+def strength(uav: str, claims: Mapping[str, Claim]) -> tuple[bool, float, str]:
+    """Sort key of who asks: who is to land or makes room, then who has been free for longest."""
     claim = claims.get(uav)
-    return (0.0 if claim is None else claim.decided_s), uav
+    if claim is None:
+        return False, 0.0, uav
+    return claim.task is not None, claim.decided_s, uav
 
 
 def _majority(seats: int) -> int:

@@ -10,9 +10,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from swarm.protocol.fields import Point
 from swarm.protocol.uav_messages import ClaimedWay
+from swarm.separation.straight_pieces import is_same_path, not_flown
 
 _NEAR_M = 0.01
 """Who is no farther from a place, seen from above, is above or below it [m]."""
@@ -71,6 +73,33 @@ def hover_shift_m(way: ClaimedWay) -> float:
     if len(path) > 1 and _above(path[0], path[1]):
         return way.shift_m + path[0][2] - path[1][2]
     return way.shift_m
+
+
+def hovering(way: ClaimedWay) -> ClaimedWay:
+    """Staying where ``way`` begins, or where it ends if it is flown."""
+    if way.flies:
+        return replace(way, path_enu_m=way.path_enu_m[-1:])
+    if way.grounded:
+        return replace(way, path_enu_m=(), shift_m=0.0)
+    here = way.path_enu_m[:1]
+    shift_m = hover_shift_m(way)
+    return replace(way, path_enu_m=here, flies=bool(here), grounded=not here, shift_m=shift_m)
+
+
+def left_of_way(
+    way: ClaimedWay, place_enu_m: Point, corners_enu_m: Sequence[Point], end_enu_m: Point | None
+) -> ClaimedWay | None:
+    """What is left of a way that is flown, if that is just what is wished now; None if not.
+
+    Args:
+        way: on which the UAV is.
+        place_enu_m: where.
+        corners_enu_m: of the way that is wished, in its own layer.
+        end_enu_m: where that ends if it keeps its height; None: higher as all the rest.
+    """
+    left = not_flown(way.path_enu_m, place_enu_m)
+    path = shifted_path(place_enu_m, corners_enu_m, way.shift_m, end_enu_m)
+    return replace(way, path_enu_m=left) if is_same_path(left, path) else None
 
 
 def _above(one_enu_m: Point, other_enu_m: Point) -> bool:
