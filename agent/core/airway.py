@@ -334,14 +334,14 @@ class Airway:
         if wish is None or self._aside is not None:
             return []
         waited_s, end_s = now_s - wish.since_s, self.sortie_end_s()
+        if self._aloft and self._fleet.must_land(wish, end_s, self._retry_s):
+            return self._come_down(wish)
         spent = wish.asked and self._mission_view.mission_s(now_s) > end_s
         if wish.task is not None and (waited_s > GIVES_UP_S or spent):
             self._wish = None
             self._way = hovering(self._told_way)
             self._actions.append(LogLine("no way", {"task": wish.task}))
             return [Refused(wish.order, "no way there becomes free", passes=True)]
-        if wish.task is None and self._aloft and self._fleet.must_land(wish, end_s, self._retry_s):
-            return self._come_down(wish)
         self._pursue(air, wish, now_s)
         return []
 
@@ -349,11 +349,11 @@ class Airway:
         """Land where it hovers: above and below that nobody else is granted anything."""
         self._comes_down = True
         self._drop_wish()
-        self._actions.append(LogLine("lands where it is", {}))
+        self._actions.append(LogLine("lands where it is", {"task": wish.task}))
         if isinstance(wish.order, Return):
             self.order(wish.order)
             return []
-        return [ReturnAdvised("no way to where it could land becomes free")]
+        return [ReturnAdvised("no way becomes free, and it can wait no longer")]
 
     def _pursue(self, air: SharedAir, wish: Wish, now_s: float) -> None:
         rival = self._fleet.stronger(air, wish, self._claims()) if wish.asked else None

@@ -23,13 +23,15 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimPhase
 from swarm.separation.shared_air import SharedAir, air_of_brief, is_home, strength
 from swarm.separation.shifted import length_m
+from swarm.separation.slabs import POSITION_ERROR_M
 from swarm.separation.straight_pieces import thinned
 
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end, or is changed [s]."""
 GIVES_UP_S = 10.0
-"""How long a UAV waits for a way to a task before it looks for another task, or for one out of a
-zone before it lands there [s]."""
+"""How long a UAV waits for a way to a task before it looks for another task [s]."""
+LEAVES_ZONE_S = 5.0
+"""How long it waits for a way out of a zone that is drawn over it before it lands there [s]."""
 PATIENT_S = 300.0
 """How long one whose battery has no end waits for its way home before it lands where it is [s]."""
 _TRIES = 2.0
@@ -208,27 +210,29 @@ class FleetAir:
         return self._mission_s <= self.sets_off_by_s(wish, sortie_end_s, climb_s) + more_s
 
     def must_land(self, wish: Wish, sortie_end_s: float, retry_s: float) -> bool:
-        """Whether it must not wait any longer for a way home, or out of a zone.
+        """Whether it can't wait any longer for a way home, or out of a zone.
 
         Args:
-            wish: for that way.
+            wish: for a way, wherever it leads.
             sortie_end_s: by when it must have landed, its reserve kept [s mission time].
             retry_s: how long it takes until it looks again [s].
         """
         waited_s = self._mission_view.now_s - wish.since_s
-        if waited_s <= _TRIES * retry_s:
-            return False
-        if self._mission_s + retry_s > self.sets_off_by_s(wish, sortie_end_s):
+        if waited_s > LEAVES_ZONE_S and self._is_in_zone():
             return True
-        return waited_s > GIVES_UP_S and self._is_in_zone()
+        late = self._mission_s + retry_s > self.sets_off_by_s(wish, sortie_end_s)
+        return late and wish.task is None and waited_s > _TRIES * retry_s
 
     def _is_in_zone(self) -> bool:
-        """Whether a zone has been drawn over it."""
+        """Whether a zone has been drawn over it: beside one it may seem in by chance."""
         problem, place = self._mission_view.board.field_problem, self._mission_view.place_enu_m
         if not zones_in_force(self._replica) or problem is None or problem.network is None:
             return False
         row = problem.uav_ids.index(UavId(self._uav))
-        return place is not None and problem.network.way_out_m(row, place) is not None
+        out_m = None if place is None else problem.network.way_out_m(row, place)
+        if place is None or out_m is None:
+            return False
+        return math.dist(place[:2], out_m[:2]) > POSITION_ERROR_M
 
     def standing(self) -> tuple[str, BaseStage] | None:
         """Base and stage of who stands there, by its own last word."""

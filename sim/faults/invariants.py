@@ -15,8 +15,8 @@ Beside the invariants of the messages (sim.faults.message_log):
 - *task lost*: in the end each task that was posted, or added by the operator, is done, failed,
   withdrawn, or open with no UAV able to do it that knew of it before it left, and of a mission
   that had begun, and came home of its own accord; or the operator added it too late, when the
-  coordinator ended the mission. Who was kept apart found no way there while somebody was lost or
-  not heard, or had to land where it was, was not able to do it;
+  coordinator ended the mission. Who found no way there while somebody was lost or not heard, had
+  to land where it was, or come home from a hold, was not able to do it;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
 - *too near*: no two UAVs in the air are nearer to each other than the mission's separation;
 - in the field those of `sim.faults.field_judge`, but for batteries of UAVs whose agents were no
@@ -86,8 +86,9 @@ class InvariantChecker:
         self._changed_s: dict[str, float] = {}
         self._without_way: set[tuple[str, str]] = set()
         """UAV and task, to which it found no way while air was shut by somebody who was missing."""
-        self._came_down: set[str] = set()
-        """UAVs that landed where they were, for want of a way home."""
+        self._taken_out: set[str] = set()
+        """UAVs that landed where they were, for want of a way home, or whose battery was used up
+        while the operator held them."""
         self._steps = 0
         self._steps_at_s = 0.0
         self._left_in_calm: set[str] = set()
@@ -170,8 +171,9 @@ class InvariantChecker:
             self.message_log.refused(process.name, str(note.fields["task"]))
             if isinstance(process.core, AgentCore) and self._lacks_somebody(process, process.core):
                 self._without_way.add((process.name, str(note.fields["task"])))
-        if note.text == "lands where it is":
-            self._came_down.add(process.name)
+        if note.text == "lands where it is" or (note.text == "returning" and _is_held(process)):
+            self._taken_out.add(process.name)
+            self.message_log.gave_up(process.name, str(note.fields.get("task")))
         if note.text == "turns aside":
             self.message_log.turned_aside(self._now_s, process.name, str(note.fields["task"]))
             self._stop_if_broken()
@@ -293,7 +295,7 @@ class InvariantChecker:
             for uav in world.mission.uavs
             if world.finished.get(uav.id) == 0
             and not message_log.sent_home(uav.id)
-            and uav.id not in self._came_down
+            and uav.id not in self._taken_out
         ]
         to_do = {
             uav: self._left_undone.get(uav, _on_board(core.replica))
@@ -463,6 +465,13 @@ def _task_states(core: AgentCore) -> dict[str, TaskState]:
 
 def _on_board(replica: Replica) -> set[str]:
     return {task for task, entry in replica.board.items() if not entry.withdrawn}
+
+
+def _is_held(process: Process) -> bool:
+    """Whether the operator's last word to the UAV of ``process`` was to hold."""
+    core = process.core
+    word = newest_command(core.replica, core.uav) if isinstance(core, AgentCore) else None
+    return word is not None and word[1].kind is CommandKind.HOLD
 
 
 def _coordinates(core: object) -> bool:

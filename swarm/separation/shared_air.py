@@ -56,6 +56,11 @@ class SharedAir:
             starter.uav: ClaimedWay(0, (starter.hovers_enu_m,), flies=True) for starter in fleet
         }
         self._paths: dict[str, tuple[ClaimedWay, Path]] = {}
+        self._lined_up: Mapping[str, Claim] | None = None
+        """By whose claims seats were looked at last."""
+        self._lined_up_but: Collection[str] = ()
+        """And who was not in the air then."""
+        self._lines_now: Sequence[Sequence[str | None]] = ()
 
     # -- what is taken -------------------------------------------------------------------
 
@@ -118,29 +123,59 @@ class SharedAir:
         self, seat: int, claims: Mapping[str, Claim], expired: Collection[str]
     ) -> str | None:
         """Who sits on a seat; None: nobody is left in the air."""
-        return self._line(seat, claims, expired)[-1]
+        return self._lines(claims, expired)[seat][-1]
 
     def stacks_of(
         self, uav: str, claims: Mapping[str, Claim], expired: Collection[str]
     ) -> frozenset[int]:
         """Stacks in which ``uav`` has a seat."""
-        seats = enumerate(self._stack_of)
+        lines = self._lines(claims, expired)
         return frozenset(
-            stack for seat, stack in seats if self.holder(seat, claims, expired) == uav
+            stack for stack, line in zip(self._stack_of, lines, strict=True) if line[-1] == uav
         )
 
+    def _lines(
+        self, claims: Mapping[str, Claim], expired: Collection[str]
+    ) -> Sequence[Sequence[str | None]]:
+        """By seat, all who have sat there, one after the other, up to who does now."""
+        if claims != self._lined_up or set(expired) != self._lined_up_but:
+            self._lined_up, self._lined_up_but = dict(claims), set(expired)
+            told = ((uav, self.way(uav, claims).keeps) for uav in self._uavs)
+            keeping = [(uav, keeps) for uav, keeps in told if keeps and not is_home(claims[uav])]
+            self._lines_now = [
+                self._line(
+                    first,
+                    [uav for uav, keeps in keeping if seat in keeps],
+                    claims,
+                    expired,
+                )
+                for seat, first in enumerate(self._first)
+            ]
+        return self._lines_now
+
     def _line(
-        self, seat: int, claims: Mapping[str, Claim], expired: Collection[str]
+        self,
+        first: str,
+        keeping: Sequence[str],
+        claims: Mapping[str, Claim],
+        expired: Collection[str],
     ) -> list[str | None]:
-        """All who have sat there, one after the other, up to who does now.
+        """All who have sat on one seat.
 
         Who is home for good has named an heir; of who has not, or can't be there any more, it is
-        the next one in the brief's order. Who says that it has taken over sits there.
+        the next one in the brief's order. Who says that it has taken over sits there: it must have
+        taken those before for gone.
+
+        Args:
+            first: who sat there first.
+            keeping: who say that they have taken that seat over, and are not home.
+            claims: newest known of everyone.
+            expired: who is not in the air any more.
         """
         line: list[str | None] = []
-        uav = self._first[seat]
+        uav = first
         while True:
-            after = self._taken_over(seat, uav, claims)
+            after = next((other for other in keeping if other != uav), None)
             if after is None or after in line:
                 if not (uav in expired or is_home(claims.get(uav))):
                     return [*line, uav]
@@ -154,19 +189,6 @@ class SharedAir:
                 return [*line, None]
             uav = after
 
-    def _taken_over(self, seat: int, uav: str, claims: Mapping[str, Claim]) -> str | None:
-        """Who else says that it sits there; it must have taken ``uav`` for gone."""
-        return next(
-            (
-                other
-                for other in self._uavs
-                if other != uav
-                and seat in self.way(other, claims).keeps
-                and not is_home(claims.get(other))
-            ),
-            None,
-        )
-
     def can_grant(
         self,
         path: Path,
@@ -177,8 +199,9 @@ class SharedAir:
         grounded: bool = False,
     ) -> bool:
         """Whether enough of those who keep the air of ``path`` could hear a request."""
+        lines = self._lines(claims, expired)
         for seats in self._asked_seats(self.slabs.asked(path, grounded=grounded)):
-            holders = [self.holder(seat, claims, expired) for seat in seats]
+            holders = [lines[seat][-1] for seat in seats]
             heard = sum(holder is not None and reaches(holder) for holder in holders)
             if heard < _majority(len(holders)):
                 return False
@@ -204,8 +227,7 @@ class SharedAir:
         """
         told = self.way(uav, claims).keeps
         found = []
-        for seat in range(len(self._first)):
-            *before, now = self._line(seat, claims, expired)
+        for seat, (*before, now) in enumerate(self._lines(claims, expired)):
             if now != uav or not before:
                 continue
             known = all(each and self._is_settled(each, claims, heard, expired) for each in before)
@@ -272,7 +294,7 @@ class SharedAir:
         self, keeper: str, claims: Mapping[str, Claim], expired: Collection[str]
     ) -> list[Mapping[str, int]]:
         """What ``keeper`` has granted, and what those did on whose seats it sits, or is to sit."""
-        lines = (self._line(seat, claims, expired) for seat in range(len(self._first)))
+        lines = self._lines(claims, expired)
         before = {each for *some, now in lines if now == keeper for each in some if each}
         return [self.way(each, claims).grants for each in (keeper, *sorted(before))]
 

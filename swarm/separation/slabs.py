@@ -14,6 +14,7 @@ import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -150,10 +151,17 @@ class Slabs:
             path_enu_m: (k, 3) from where it is on [m].
             grounded: it stands on the ground, and so has no air of its own yet.
         """
-        touched = self.touched(path_enu_m)
-        if grounded or len(path_enu_m) < 2 or not is_upright(path_enu_m[:2]):
-            return touched if len(path_enu_m) > 1 or grounded else frozenset()
-        return self.touched(path_enu_m[1:]) | (touched - self.touched(path_enu_m[:1]))
+        return _asked(self, path_enu_m.tobytes(), grounded=grounded)
+
+
+@lru_cache(maxsize=1024)
+def _asked(slabs: Slabs, path: bytes, *, grounded: bool) -> frozenset[int]:
+    """`Slabs.asked`, of a path as bytes: the same ones are looked at again with every word."""
+    path_enu_m = np.frombuffer(path).reshape(-1, 3)
+    touched = slabs.touched(path_enu_m)
+    if grounded or len(path_enu_m) < 2 or not is_upright(path_enu_m[:2]):
+        return touched if len(path_enu_m) > 1 or grounded else frozenset()
+    return slabs.touched(path_enu_m[1:]) | (touched - slabs.touched(path_enu_m[:1]))
 
 
 def is_upright(path_enu_m: Path) -> bool:
@@ -173,6 +181,13 @@ def apart(
         other_enu_m: (l, 3) corners [m].
         within: slabs that matter; None: all.
     """
+    return _apart(slabs, one_enu_m.tobytes(), other_enu_m.tobytes(), within)
+
+
+@lru_cache(maxsize=4096)
+def _apart(slabs: Slabs, one: bytes, other: bytes, within: frozenset[int] | None) -> bool:
+    """`apart`, of paths as bytes: the same ones are looked at again with every word."""
+    one_enu_m, other_enu_m = (np.frombuffer(path).reshape(-1, 3) for path in (one, other))
     common = slabs.touched(one_enu_m) & slabs.touched(other_enu_m)
     asked_m = planned_apart_m(slabs.separation_m) - _ROUNDED_M
     if len(common) > _MANY:
@@ -205,23 +220,6 @@ def least_flat_m(ones_m: FloatArray, others_m: FloatArray) -> float:
         _ends_from(others_m, ones_m),
     ]
     return float(min(near_m))
-
-
-def nearest_m(one_enu_m: Path, other_enu_m: Path, step_m: float) -> float:
-    """Least distance of two paths in space [m], to half of ``step_m``."""
-    begin, end = other_enu_m, other_enu_m
-    if len(other_enu_m) > 1:
-        begin, end = other_enu_m[:-1], other_enu_m[1:]
-    way = end - begin
-    length2 = (way * way).sum(axis=1)
-    places = [one_enu_m[:1]]
-    for here, there in itertools.pairwise(one_enu_m):
-        count = 1 + math.ceil(math.dist(here, there) / step_m)
-        places.append(np.linspace(here, there, count)[1:])
-    points = np.concatenate(places)[:, None]
-    along = ((points - begin) * way).sum(axis=2) / np.where(length2 > 0.0, length2, 1.0)
-    nearest = begin + np.clip(along, 0.0, 1.0)[:, :, None] * way
-    return float(np.sqrt(((points - nearest) ** 2).sum(axis=2).min()))
 
 
 def _flat_pieces(path_enu_m: Path, low_m: float, high_m: float) -> FloatArray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from sim.faults.case import FIRST_OF_MANY, FIRST_WITH_SEPARATION, play
+from sim.faults.case import FIRST_OF_MANY, FIRST_WITH_SEPARATION, parse_case, play
 from sim.faults.generator import random_case
 from sim.world.closest_approach import closest_approach
 
@@ -15,9 +15,14 @@ BROKEN_ONCE = {
     3000173: "who waited for a slanted way through two slabs kept another from making room",
     3000182: "who had landed from another layer took off into the air below its own",
     3000192: "a return from the ground left a wish for another way standing",
-    3000195: "the last resort led through another UAV",
+    3000195: "who found no way home flew through another UAV",
+    3000450: "who went home climbed first, for which nobody had reckoned its battery, and fell",
+    3000469: "who was on its way home stopped, asked for that way again, and lost its place",
     3001022: "who left a task's height asked for air far above its layer, and waited in a zone",
     3001046: "the judge took UAVs to be in other layers than they flew in",
+    3010048: "a way round a zone had more corners than a claim can tell, and was never asked for",
+    3010070: "two went home, and the one in the way of the other waited for it",
+    3010092: "an heir sat beside whom it followed, and was lost: two of three seats were",
     3001103: "who was stopped on its way down took a quarter of a minute for it, and fell",
 }
 
@@ -30,6 +35,18 @@ def test_no_pair_comes_nearer_than_the_separation_whatever_goes_wrong() -> None:
 @pytest.mark.parametrize("seed", BROKEN_ONCE)
 def test_what_broke_once_holds(seed: int) -> None:
     _check(seed)
+
+
+def test_who_is_cut_off_in_a_zone_drawn_over_it_lands_there() -> None:
+    cut_off = [
+        "fleet seed=3010001 uavs=6 tasks=15",
+        "8 zone u1 by 0.95 for 40",
+        "9.2 cut u1 for 40",
+    ]
+    done = play(parse_case(cut_off, "a test"))
+    flown_s = done.world.tracks["u1"].flights_s
+    assert done.broken is None, done.broken
+    assert 9.2 < flown_s[0][1] < 20.0, flown_s
 
 
 def test_a_larger_fleet_keeps_apart_too() -> None:

@@ -23,8 +23,13 @@ HILLY = SharedAir(Slabs.over(10.0, (30.0, 42.0, 54.0), (0.0, 60.0)), FLEET)
 ALL = {"u0", "u1", "u2"}
 
 
-def claim(way: ClaimedWay, decided_s: float = 0.0, phase: ClaimPhase = ClaimPhase.IDLE) -> Claim:
-    return Claim(phase, None, decided_s, 0, 0.0, way=way)
+def claim(
+    way: ClaimedWay,
+    decided_s: float = 0.0,
+    phase: ClaimPhase = ClaimPhase.IDLE,
+    task: str | None = None,
+) -> Claim:
+    return Claim(phase, task, decided_s, 0, 0.0, way=way)
 
 
 def asks(number: int, *path: tuple[float, float, float]) -> ClaimedWay:
@@ -113,6 +118,16 @@ def test_of_two_ways_that_meet_the_one_of_who_waits_longer_is_granted() -> None:
     assert ALONE.granted("u0", claims, ALL, ()) == {"u2": 1}
 
 
+def test_who_is_to_land_goes_before_who_goes_to_a_task() -> None:
+    waits = asks(1, (100.0, 0.0, 30.0), (200.0, 100.0, 30.0))
+    lands = asks(1, (200.0, 0.0, 30.0), (100.0, 100.0, 30.0))
+    claims = {
+        "u1": claim(waits, 3.0, ClaimPhase.HELD, "t1"),
+        "u2": claim(lands, 5.0),
+    }
+    assert ALONE.granted("u0", claims, ALL, ()) == {"u2": 1}
+
+
 def test_what_is_granted_stays_taken_until_its_uav_asks_for_something_else() -> None:
     crossing = asks(1, (100.0, 0.0, 30.0), (200.0, 100.0, 30.0))
     claims = {"u1": claim(crossing, 5.0), "u2": claim(asks(1, (200.0, 0.0, 30.0)), 9.0)}
@@ -130,6 +145,15 @@ def test_who_leaves_where_it_is_in_the_way_of_a_stronger_one_need_not_wait_for_i
         "u2": claim(asks(1, (200.0, 0.0, 30.0), (50.0, 0.0, 30.0)), decided_s=1.0),
     }
     assert ALONE.granted("u0", claims, ALL, ()) == {"u1": 1}
+
+
+def test_who_lands_for_good_in_the_way_of_a_stronger_one_need_not_wait_for_it_either() -> None:
+    stronger = claim(asks(1, (200.0, 0.0, 30.0), (50.0, 0.0, 30.0)), decided_s=1.0)
+    lands = asks(1, (100.0, 0.0, 30.0), (60.0, 0.0, 30.0))
+    stays = {"u1": claim(lands, decided_s=5.0), "u2": stronger}
+    leaves = {"u1": claim(lands, 5.0, ClaimPhase.OUT), "u2": stronger}
+    assert ALONE.granted("u0", stays, ALL, ()) == {}
+    assert ALONE.granted("u0", leaves, ALL, ()) == {"u1": 1}
 
 
 def test_a_keeper_that_knows_less_than_it_granted_grants_nothing() -> None:
@@ -278,6 +302,11 @@ class Sky:
             self.say(name, ended, ClaimPhase.OUT)
         elif fate < 0.08 and self.lost:
             expired.add(str(rng.choice(sorted(self.lost))))
+        elif fate < 0.14 and way.flies and len(way.path_enu_m) > 1:  # half of a piece is flown
+            first, second, *rest = way.path_enu_m
+            east_m, north_m, up_m = (0.5 * (a + b) for a, b in zip(first, second, strict=True))
+            path = ((east_m, north_m, up_m), second, *rest)
+            self.truth[name] = claim(replace(way, path_enu_m=path), decided_s)
         elif fate < 0.4 or (way.flies and fate < 0.8):  # it wants to be somewhere else
             here = way.path_enu_m[-1:] if way.flies else way.path_enu_m[:1]
             self.ask(name, replace(way, path_enu_m=here))

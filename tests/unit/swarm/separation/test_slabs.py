@@ -16,7 +16,6 @@ from swarm.separation.slabs import (
     keeper_rows,
     keeper_seats,
     least_flat_m,
-    nearest_m,
     shared_layers_m,
     start_layers,
 )
@@ -241,18 +240,3 @@ def test_over_hills_three_keep_each_stack_as_soon_as_there_are_three() -> None:
     assert keeper_seats(3, 3, level=False) == ((0, 1, 2), (1, 2, 0), (2, 0, 1))
     assert keeper_seats(7, 3, level=False)[-1] == (2, 0, 1)
     assert keeper_seats(3, 2, level=False) == ((0,), (0,), (1,))
-
-
-def test_the_nearest_of_two_paths_in_space_is_found_to_half_a_step() -> None:
-    rng = np.random.default_rng(5)
-    for _ in range(50):
-        one, other = path_of(rng, SLABS), path_of(rng, SLABS)
-        places = [
-            np.concatenate([np.linspace(a, b, 200) for a, b in itertools.pairwise(each)])
-            if len(each) > 1
-            else each
-            for each in (one, other)
-        ]
-        sampled_m = float(np.linalg.norm(places[0][:, None] - places[1][None], axis=2).min())
-        found_m = nearest_m(one, other, 0.5)
-        assert sampled_m - 1.0 <= found_m <= sampled_m + 0.25 + 1e-9
