@@ -38,6 +38,8 @@ class TimeLimits(AgentPart):
         """Mission time by which the work must have begun: window, due time and battery [s]."""
         backwards = bool(claim.reversed)
         takes_s = self._flights.line_s(task.task, backwards=backwards) + task.service_s
+        if math.isinf(takes_s):  # a zone lies over its line
+            return -math.inf
         ends_s = self._sortie.end_s - self._home_s(task, claim)
         if task.due_s is not None:
             ends_s = min(ends_s, task.due_s)

@@ -20,10 +20,11 @@ BROKEN_ONCE = {
     3000469: "who was on its way home stopped, asked for that way again, and lost its place",
     3001022: "who left a task's height asked for air far above its layer, and waited in a zone",
     3001046: "the judge took UAVs to be in other layers than they flew in",
+    3001103: "who was stopped on its way down took a quarter of a minute for it, and fell",
     3010048: "a way round a zone had more corners than a claim can tell, and was never asked for",
     3010070: "two went home, and the one in the way of the other waited for it",
     3010092: "an heir sat beside whom it followed, and was lost: two of three seats were",
-    3001103: "who was stopped on its way down took a quarter of a minute for it, and fell",
+    3010313: "a line under a new zone was flown by one whose battery has no end",
 }
 
 
