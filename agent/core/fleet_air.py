@@ -327,7 +327,7 @@ class FleetAir:
         fleet = [] if self._brief is None else [uav.id for uav in self._brief.uavs]
         after = 1 + fleet.index(self._uav) if self._uav in fleet else 0
         mine = air.stacks_of(self._uav, claims, expired)
-        found = []
+        found: list[tuple[bool, int, int, str]] = []
         for uav in (*fleet[after:], *fleet[:after]):
             claim = claims.get(uav)
             if uav != self._uav and self.reaches(uav) and claim is not None and not is_home(claim):
