@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import contextlib
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,38 +25,46 @@ from swarm.runtime.options import (
 )
 
 if TYPE_CHECKING:
-    from agent.core.agent_core import AgentCore
-    from agent.runner import MakeVehicle, OnReport, Vehicle
-    from swarm.bus.config import BusConfig
+    from agent.lives import Member
+    from agent.runner import OnReport, Vehicle
     from swarm.identity import Identity
     from swarm.protocol.messages import MissionConfig
-    from swarm.runtime.clock import ScaledClock
     from swarm.runtime.store import Memory, Store
 
 
 @with_options
 def agent(
     mission: MissionOption,
-    uav: Annotated[str, typer.Option("--uav", metavar="ID", help="UAV this agent flies.")],
+    uav: Annotated[
+        list[str],
+        typer.Option(
+            "--uav",
+            metavar="ID",
+            help="UAV this agent flies. May be repeated where vehicles are simulated: one process "
+            "is the agents of several UAVs then, and all are gone when it dies.",
+        ),
+    ],
     mavlink: Annotated[
-        str,
+        list[str],
         typer.Option(
             "--mavlink",
             metavar="URL",
             help="Its autopilot: tcp:HOST:PORT, udpin:HOST:PORT, udpout:HOST:PORT or "
-            "serial:DEVICE:BAUD.",
+            "serial:DEVICE:BAUD. Of several UAVs one each, in the same order.",
         ),
     ],
     system_id: Annotated[
-        int,
+        list[int] | None,
         typer.Option(
             "--system-id",
             min=1,
             max=255,
             metavar="N",
-            help="MAVLink system id of the autopilot; no other vehicle is ever commanded.",
+            help="MAVLink system id of the autopilot; no other vehicle is ever commanded. Of "
+            "several UAVs one each; 1 by default.",
+            show_default=False,
         ),
-    ] = 1,
+    ] = None,
     ground_id: Annotated[
         str,
         typer.Option(
@@ -211,7 +221,7 @@ def agent(
     """Fly one UAV: decide, claim and command its autopilot.
 
     The agent learns the mission from the bus, so it needs no scenario file. Start one for
-    each UAV, with the autopilot simulated or real.
+    each UAV, with the autopilot simulated or real. Prints one JSON object when it has joined.
 
     Examples:
       swarm agent --mission table-1 --uav uav1 --mavlink tcp:127.0.0.1:5760
@@ -223,20 +233,23 @@ def agent(
     from agent.core.path_clearance import PATH_CLEARANCE_M
     from agent.core.verticals import Verticals
     from agent.links.mavlink_vehicle import MavlinkVehicle
+    from agent.lives import Life, live, members_of
     from agent.vehicle.config import BridgeConfig, status_rate_for
     from agent.vehicle.signing import load_signing_key
+    from swarm.bus.zenoh_bus import open_zenoh_bus
     from swarm.identity import Role
     from swarm.model import Origin
     from swarm.runtime.clock import ScaledClock, incarnation
     from swarm.runtime.log import configure_logging
-    from swarm.runtime.store import Store
 
     # A life begins with its process: of two agents of one UAV the one started last counts.
     life = incarnation()
-    configure_logging(log_level, log_format, mission=mission, uav=uav, incarnation=life)
+    alone = {"uav": uav[0]} if len(uav) == 1 else {}
+    configure_logging(log_level, log_format, mission=mission, **alone, incarnation=life)
     _check_ids(mission, uav)
     network = seat.network
-    config = seat.config(mission=mission, roles=(Role.UAV,), name=uav)
+    config = seat.config(mission=mission, roles=(Role.UAV,), name=uav[0])
+    members = members_of(uav, mavlink, system_id or [1] * len(uav), config)
     shown = forward or ()
     _check_links(mavlink, shown, heeds=station_actions, signed=signing_key is not None)
     own_system_id, own_component_id = _ground_ids(ground_id)
@@ -244,11 +257,12 @@ def agent(
     if check:
         return 0
     if config.identity is not None and key is None:
-        _tell_unsigned(uav, config.identity)
+        _tell_unsigned(uav[0], config.identity)
 
-    def vehicle(brief: MissionConfig, report: OnReport) -> Vehicle:
+    def vehicle(flown: Member, brief: MissionConfig, report: OnReport) -> Vehicle:
+        _tell_joined(mission, flown.uav)
         settings = BridgeConfig(
-            system_id=system_id,
+            system_id=flown.system_id,
             origin=Origin(*brief.origin),
             ground_system_id=own_system_id,
             ground_component_id=own_component_id,
@@ -257,7 +271,7 @@ def agent(
             acceptance_radius_m=acceptance_radius_m,
             position_rate_hz=position_rate_hz,
             status_rate_hz=status_rate_for(position_rate_hz),
-            battery_reserve_frac=_reserve_frac(battery_reserve, brief, uav),
+            battery_reserve_frac=_reserve_frac(battery_reserve, brief, flown.uav),
             raises_jerk=not keep_jerk,
             ready_by_itself=ready_by_itself,
             zones=tuple(spec.zone() for spec in brief.zones),
@@ -268,13 +282,13 @@ def agent(
         ).for_speedup(speedup)
         asked = report if station_actions else None
         return MavlinkVehicle(
-            settings, mavlink, clock, report, key=key, forward=shown, on_asked=asked
+            settings, flown.mavlink, clock, report, key=key, forward=shown, on_asked=asked
         )
 
-    def core(memory: Memory | None) -> AgentCore:
+    def core(flown: Member, memory: Memory | None) -> AgentCore:
         return AgentCore(
             mission,
-            uav,
+            flown.uav,
             life,
             network.timing.scaled(speedup),
             None if memory is None else memory.snapshot,
@@ -287,66 +301,38 @@ def agent(
         )
 
     clock = ScaledClock(speedup)
-    store = None if state is None else Store(state, mission, uav, speedup=speedup)
-    return _live(
-        config,
-        core,
-        vehicle,
-        clock,
-        mission=mission,
-        uav=uav,
-        store=store,
-        answer_s=network.answer_s,
-        lifeline=lifeline,
-    )
+    kept = partial(_store, state, mission, speedup)
+    lives = [Life(m.uav, partial(core, m), partial(vehicle, m), kept(m.uav)) for m in members]
+    seated = partial(open_zenoh_bus, config)
+    answer_s = network.answer_s
+    return live(lives, seated, clock, mission=mission, answer_s=answer_s, lifeline=lifeline)
 
 
-def _live(
-    config: BusConfig,
-    make_core: Callable[[Memory | None], AgentCore],
-    make_vehicle: MakeVehicle,
-    clock: ScaledClock,
-    *,
-    mission: str,
-    uav: str,
-    store: Store | None,
-    answer_s: float,
-    lifeline: bool,
-) -> int:
-    """Live on the bus to the end, and close the store; the exit status of the command."""
-    import asyncio
+def _store(folder: Path | None, mission: str, speedup: float, uav: str) -> Store | None:
+    from swarm.runtime.store import Store
 
-    from agent.runner import live_once
-    from swarm.bus.zenoh_bus import open_zenoh_bus
-
-    try:
-        return asyncio.run(
-            live_once(
-                lambda: open_zenoh_bus(config),
-                make_core,
-                make_vehicle,
-                clock,
-                mission=mission,
-                uav=uav,
-                store=store,
-                answer_s=answer_s,
-                lifeline=lifeline,
-                on_wait=lambda reason: _tell_no_bus(uav, reason),
-            )
-        )
-    finally:
-        if store is not None:
-            store.close()
+    return None if folder is None else Store(folder, mission, uav, speedup=speedup)
 
 
-def _check_links(mavlink: str, forward: Sequence[str], *, heeds: bool, signed: bool) -> None:
+def _check_links(
+    links: Sequence[str], forward: Sequence[str], *, heeds: bool, signed: bool
+) -> None:
     from agent.vehicle.config import check_station_actions, parse_forward, parse_link
 
-    parse_link(mavlink)
+    for url in links:
+        parse_link(url)
     for url in forward:
         parse_forward(url)
     if heeds:
         check_station_actions(forward, signed=signed)
+
+
+def _tell_joined(mission: str, uav: str) -> None:
+    """Tell whoever has started this process that it knows the mission and takes part."""
+    import json
+
+    with contextlib.suppress(OSError):  # nobody listens any more
+        print(json.dumps({"mission": mission, "uav": uav}), flush=True)
 
 
 def _tell_unsigned(uav: str, identity: Identity) -> None:
@@ -354,14 +340,6 @@ def _tell_unsigned(uav: str, identity: Identity) -> None:
 
     hint = f"give the autopilot its pass phrase, and --signing-key {identity.mavlink_key_path}"
     get_logger(uav).warning("what is said to the autopilot is not signed", hint=hint)
-
-
-def _tell_no_bus(uav: str, reason: str) -> None:
-    from swarm.runtime.log import get_logger
-    from swarm.runtime.process import SERVICE_NOTIFIER
-
-    get_logger(uav).warning("no bus yet", reason=reason)
-    SERVICE_NOTIFIER.waiting(f"{uav}: no bus yet: {reason}")
 
 
 _RESERVE_FRAC = 0.2
@@ -393,17 +371,18 @@ def _ground_ids(text: str) -> tuple[int, int]:
     return int(parts[0]), int(parts[1])
 
 
-def _check_ids(mission: str, uav: str) -> None:
+def _check_ids(mission: str, uavs: Sequence[str]) -> None:
     from swarm.model.ids import ID_RULE, RESERVED, valid_id
     from swarm.runtime.errors import Fault, InputError
 
     faults = [
         Fault(option, "", f"{text!r} is no id", f"give {ID_RULE}")
-        for option, text in (("--mission", mission), ("--uav", uav))
+        for option, text in (("--mission", mission), *(("--uav", uav) for uav in uavs))
         if not valid_id(text)
     ]
-    if uav in RESERVED:
-        problem = f"{uav!r} is the name of {RESERVED[uav]}"
-        faults.append(Fault("--uav", "", problem, "give a UAV's id"))
+    for uav in uavs:
+        if uav in RESERVED:
+            problem = f"{uav!r} is the name of {RESERVED[uav]}"
+            faults.append(Fault("--uav", "", problem, "give a UAV's id"))
     if faults:
         raise InputError(*faults)

@@ -33,7 +33,7 @@ from swarm.protocol.messages import MissionConfig, Snapshot
 from swarm.protocol.timing import PRESETS, LinkKind
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import BusError
-from swarm.runtime.process import SERVICE_NOTIFIER, ServiceNotifier, StopRequest, stop_requests
+from swarm.runtime.process import SERVICE_NOTIFIER, ServiceNotifier, StopRequest
 from swarm.runtime.shell import Shell, join_mission
 from swarm.runtime.store import Memory, Store
 
@@ -151,45 +151,44 @@ async def live_once(
     make_core: Callable[[Memory | None], AgentCore],
     make_vehicle: MakeVehicle,
     clock: Clock,
+    stop: StopRequest,
     *,
     mission: str,
     uav: str,
     store: Store | None,
     answer_s: float,
-    lifeline: bool,
     on_wait: Callable[[str], None],
 ) -> int:
-    """One life of an agent's process, from its seat on the bus to its end; the exit status.
+    """One life of an agent, from its seat on the bus to its end; the exit status.
 
     Args:
         open_bus: tries once to get a seat.
         make_core: makes the agent, given what its earlier life has kept.
         make_vehicle: as for `run_agent`.
         clock: gives the core's time.
+        stop: asks to leave early.
         mission: mission name.
         uav: id of its UAV.
         store: keeps what the core knows for its next life; None: nothing is kept.
         answer_s: how long a question waits for the slowest answer [wall s].
-        lifeline: whether the end of standard input ends the process.
         on_wait: called with the reason whenever there was no seat.
     """
-    async with stop_requests(lifeline=lifeline) as stop:
-        SERVICE_NOTIFIER.waiting(f"{uav}: looks for the bus")
-        seat = await seat_or_stop(open_bus, stop, on_wait)
-        if seat is None:
-            return stop.exit_status or 0
-        SERVICE_NOTIFIER.ready(f"{uav}: on the bus, in mission {mission}")
-        # Only now: waiting for a seat may have taken long.
-        core = make_core(None if store is None else store.load(seat.seal))
-        save = None if store is None else store.save
-        try:
-            status = await run_agent(
-                core, mission, seat, clock, make_vehicle, stop, save=save, answer_s=answer_s
-            )
-        finally:
-            seat.close()
-        await pause_between_lives(stop)
-        return status
+    SERVICE_NOTIFIER.waiting(f"{uav}: looks for the bus")
+    seat = await seat_or_stop(open_bus, stop, on_wait)
+    if seat is None:
+        return stop.exit_status or 0
+    SERVICE_NOTIFIER.ready(f"{uav}: on the bus, in mission {mission}")
+    # Only now: waiting for a seat may have taken long.
+    core = make_core(None if store is None else store.load(seat.seal))
+    save = None if store is None else store.save
+    try:
+        status = await run_agent(
+            core, mission, seat, clock, make_vehicle, stop, save=save, answer_s=answer_s
+        )
+    finally:
+        seat.close()
+    await pause_between_lives(stop)
+    return status
 
 
 async def run_agent(

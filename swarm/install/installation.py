@@ -171,7 +171,7 @@ def plan_installation(
         File(service.unit_path, unit.replace(str(DEFAULT_PROGRAM), str(program)).encode()),
         File(service.options_path, text.encode()),
     ]
-    port = _serial_port(parameters.get("mavlink"))
+    port = _serial_port(parameters)
     if port is not None:
         units.append(File(service.drop_in_path, _serial_drop_in(port, root).encode()))
     return Installation(service, program, tuple(final), (*units, *files), tuple(notes))
@@ -189,7 +189,7 @@ def _checked(
     if port is not None and 0 < port < _LOWEST_PORT:
         problem = f"--port {port} is for root alone, and it runs as {service.kind.user}"
         raise _fault(service, problem, f"give one from {_LOWEST_PORT} on")
-    device = _serial_port(parameters.get("mavlink"))
+    device = _serial_port(parameters)
     if device is not None:
         _check_serial(device, root)
     return parameters
@@ -311,11 +311,12 @@ def _key_files(service: ServiceInstance, folder: Path, root: Path | None) -> lis
     ]
 
 
-def _serial_port(mavlink: str | None) -> PurePosixPath | None:
-    """Device of a link ``serial:DEVICE:BAUD``; None of another one."""
-    if mavlink is None or not mavlink.startswith("serial:"):
-        return None
-    return PurePosixPath(mavlink.removeprefix("serial:").rpartition(":")[0])
+def _serial_port(parameters: Mapping[str, Any]) -> PurePosixPath | None:
+    """Device of its autopilot's link ``serial:DEVICE:BAUD``; None of another one."""
+    for link in parameters.get("mavlink") or ():
+        if link.startswith("serial:"):
+            return PurePosixPath(link.removeprefix("serial:").rpartition(":")[0])
+    return None
 
 
 def _check_serial(device: PurePosixPath, root: Path | None) -> None:

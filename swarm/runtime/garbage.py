@@ -30,6 +30,11 @@ def end_start() -> None:
         _go_on_as_usual()
 
 
+def keep_all() -> None:
+    """Much has been made since that stays as well: it is not looked through again, either."""
+    gc.freeze()
+
+
 def _at_first_search(phase: str, _info: dict[str, int]) -> None:
     """Very much has been made, and nobody has said that the start is over."""
     if phase == "stop":

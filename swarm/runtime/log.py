@@ -81,6 +81,13 @@ def identify(**identity: object) -> None:
     _identity.update(identity)
 
 
+def identify_task(**identity: object) -> None:
+    """Let every line of the running asyncio task, and of what it starts, carry more ids."""
+    import structlog
+
+    structlog.contextvars.bind_contextvars(**identity)
+
+
 def get_logger(name: str, **context: object) -> FilteringBoundLogger:
     """A logger that names its module ``name`` and carries ``context`` in every line.
 

@@ -290,10 +290,13 @@ def test_every_process_of_one_of_several_machines_is_a_command_line_that_is_acce
     others = ["--connect", "tls/machine-a:7447", "--connect", "tls/machine-b:7447"]
     assert lines["router"][0][-4:] == others
     flown = [parsed(words) for words in lines["agents"]]
-    assert [(each["uav"], each["system_id"]) for each in flown] == [("uav2", 2), ("uav3", 3)]
-    assert [str(each["mavlink"]) for each in flown] == [
-        "tcp:autopilots:20001",
-        "tcp:autopilots:20002",
+    assert [(each["uav"], each["system_id"]) for each in flown] == [
+        (["uav2"], [2]),
+        (["uav3"], [3]),
+    ]
+    assert [each["mavlink"] for each in flown] == [
+        ["tcp:autopilots:20001"],
+        ["tcp:autopilots:20002"],
     ]
 
 

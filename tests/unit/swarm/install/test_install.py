@@ -29,7 +29,8 @@ def install(root: Path, *words: str) -> int:
 
 
 def install_agent(root: Path, keys: Path, *words: str, uav: str = "uav1") -> int:
-    own = ["--mission", "table-1", *SERIAL, *CONNECT, "--keys", str(keys / uav)]
+    link = [] if "--mavlink" in words else SERIAL
+    own = ["--mission", "table-1", *link, *CONNECT, "--keys", str(keys / uav)]
     return install(root, "agent", "--uav", uav, *own, *words)
 
 

@@ -49,3 +49,13 @@ def test_what_a_start_made_is_looked_through_no_more() -> None:
     garbage.end_start()
     assert gc.get_freeze_count() > frozen + len(kept)
     assert gc.get_threshold() == USUAL
+
+
+def test_what_has_been_made_since_can_be_kept_as_well() -> None:
+    garbage.begin_start()
+    garbage.end_start()
+    frozen = gc.get_freeze_count()
+    kept: list[list[object]] = [[] for _ in range(10_000)]
+    garbage.keep_all()
+    assert gc.get_freeze_count() > frozen + len(kept)
+    assert gc.get_threshold() == USUAL
