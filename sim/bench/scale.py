@@ -59,6 +59,7 @@ class ScaleSettings:
     method: str = "greedy"
     link: LinkKind = LinkKind.NORMAL
     routers: int = 1
+    agents_per_process: int = 1
     seed: int = 0
 
 
@@ -76,7 +77,7 @@ class ScaleRun:
     cpu_frac: Mapping[str, float]
     """By kind of process, processors in use while it was watched."""
     agent_share_bytes: tuple[int, ...]
-    """Proportional share of memory of every agent."""
+    """Proportional share of memory of every agent; its part of that of its process."""
     published_hz: Mapping[str, float]
     """By kind, messages of each UAV."""
     received_hz: Mapping[str, float]
@@ -218,7 +219,8 @@ class ScaleBench(BenchResult):
         settings = self.settings
         yield (
             f"survey of {settings.tasks_per_uav} tasks for each UAV, {settings.method}, "
-            f"{settings.routers} router(s), {POSITION_RATE_HZ:g} position reports a second, "
+            f"{settings.routers} router(s), {settings.agents_per_process} agent(s) in a process, "
+            f"{POSITION_RATE_HZ:g} position reports a second, "
             f"watched for {settings.watch_s:g} s; seed {settings.seed}"
         )
         for table in self.tables():
@@ -288,6 +290,7 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
         options = replace(
             usual,
             routers=settings.routers,
+            agents_per_process=settings.agents_per_process,
             position_rate_hz=POSITION_RATE_HZ,
             log_format=LogFormat.JSON,
             start_timeout_s=settings.start_limit_s,
@@ -307,7 +310,12 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
             await asyncio.sleep(settings.watch_s if runs else 0.0)
             watched_s = clock.now_s() - at_s
             said = count.heard - heard
-            shares = tuple(share_bytes(agent.pid) for agent in _living(run) if _is_agent(agent))
+            shares = tuple(
+                share_bytes(child.pid) // agents
+                for child in _living(run)
+                for agents in (_agents_in(child),)
+                for _ in range(agents)
+            )
             cpu_frac = {
                 kind: (seconds - used[kind]) / watched_s for kind, seconds in _used_s(run).items()
             }
@@ -363,8 +371,8 @@ def _living(run: Run) -> list[ChildProcess]:
     return [child for child in run.launch.lives if child.returncode is None]
 
 
-def _is_agent(child: ChildProcess) -> bool:
-    return child.arguments[0] == "agent"
+def _agents_in(child: ChildProcess) -> int:
+    return child.arguments.count("--uav") if child.arguments[0] == "agent" else 0
 
 
 def _used_s(run: Run) -> dict[str, float]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -21,6 +21,9 @@ from sim.bench.command_line import (
 from sim.options import MethodOption
 from swarm.protocol.timing import LinkKind
 from swarm.runtime.options import JsonOption, LinkOption, SeedOption
+
+if TYPE_CHECKING:
+    from sim.bench.scale import ScaleSettings
 
 
 def scale(
@@ -48,6 +51,10 @@ def scale(
     routers: Annotated[
         int, typer.Option("--routers", min=1, max=8, metavar="N", help="So many, linked.")
     ] = 1,
+    agents_per_process: Annotated[
+        int,
+        typer.Option("--agents-per-process", min=1, max=100, metavar="N", help="See swarm run."),
+    ] = 1,
     seed: SeedOption = 0,
     json: JsonOption = False,
     plot: Annotated[
@@ -62,12 +69,13 @@ def scale(
 
     Each fleet surveys at wall speed with simulated autopilots, is watched for a while in the
     midst of its mission and then ended: time to start, memory and processor time of its
-    processes, messages by kind, from an arrival to the next target. Needs Linux, and a quiet
-    machine for times.
+    processes, messages by kind, from an arrival to the next target. A fleet too large for this
+    machine is told so first, and flown all the same. Needs Linux, and a quiet machine for times.
 
     Examples:
         swarm bench scale
         swarm bench scale --sizes 10,50 --watch-s 10 --json
+        swarm bench scale --sizes 10,100,200 --agents-per-process 25
         swarm bench scale --plot scale.svg --out scale.md
     """
     from sim.bench.plan_report import write_figure
@@ -84,8 +92,10 @@ def scale(
         method=method,
         link=link,
         routers=routers,
+        agents_per_process=agents_per_process,
         seed=seed,
     )
+    _warn_of_large(settings)
     with progress() as tell:
         done = measure_scale(settings, tell)
     if plot is not None:
@@ -94,3 +104,14 @@ def scale(
         write_file("--out", out, lambda path: path.write_text(done.as_markdown(), "utf-8"))
     show(done, json=json)
     return 0
+
+
+def _warn_of_large(settings: ScaleSettings) -> None:
+    """Say which fleets this machine is too small for, before anything starts."""
+    from sim.fleet.capacity import memory_bytes, too_large, usable_cores
+
+    cores, room_bytes = usable_cores(), memory_bytes()
+    for n_uav in settings.sizes:
+        reason = too_large(n_uav, cores, room_bytes, settings.agents_per_process)
+        if reason is not None:
+            typer.echo(f"warning: {reason}", err=True)

@@ -9,10 +9,12 @@ from __future__ import annotations
 import os
 from typing import Final
 
-CPU_FRAC_PER_UAV: Final = 0.01
-"""Of one processor, in the midst of a mission of 100: an agent (0.56 %), its simulated autopilot
-(0.17 %), what router, coordinator and launcher do for it (0.1 %), and a little more. Starting takes
-more, for longer then."""
+CPU_FRAC_PER_UAV: Final = 0.0135
+"""Of one processor, in the midst of a mission of 60: an agent with a process of its own (1.06 %),
+its simulated autopilot (0.17 %), what router, coordinator and launcher do for it (0.1 %)."""
+CPU_FRAC_SHARED: Final = 0.0075
+"""The same where `MANY` agents share a process: 0.5 % for each of them."""
+MANY: Final = 10
 BYTES_PER_UAV: Final = 45 * 10**6
 """Of an agent (26 MB) and an autopilot of its own (18 MB), shares of common pages included."""
 BYTES_BESIDES: Final = 500 * 10**6
@@ -34,15 +36,16 @@ def memory_bytes() -> int:
         return 0
 
 
-def too_large(n_uav: int, cores: int, memory_bytes: int) -> str | None:
+def too_large(n_uav: int, cores: int, memory_bytes: int, agents_per_process: int = 1) -> str | None:
     """Why that machine cannot fly so many UAVs; None if it can, for all that is known.
 
     Args:
         n_uav: size of the fleet.
         cores: processors that may be used.
         memory_bytes: RAM; 0 when unknown.
+        agents_per_process: how many agents share a process; counted as alone, or as dozens.
     """
-    by_cores = int(cores / CPU_FRAC_PER_UAV)
+    by_cores = int(cores / (CPU_FRAC_PER_UAV if agents_per_process < MANY else CPU_FRAC_SHARED))
     by_memory = int(max(0, memory_bytes - BYTES_BESIDES) / BYTES_PER_UAV)
     if n_uav > by_cores:
         has = "1 core" if cores == 1 else f"{cores} cores"

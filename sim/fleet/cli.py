@@ -21,6 +21,7 @@ from swarm.runtime.options import (
 )
 
 if TYPE_CHECKING:
+    from sim.fleet.autopilots import Autopilots
     from sim.fleet.layout import BusKind, LaunchOptions
     from sim.fleet.shown_run import ShownRun
     from swarm.model import Mission
@@ -49,6 +50,18 @@ def run(
             metavar="N",
             help="Where routers are used: so many, linked to each other. With two or more the "
             "fleet keeps a router when one dies.",
+        ),
+    ] = 1,
+    agents_per_process: Annotated[
+        int,
+        typer.Option(
+            "--agents-per-process",
+            min=1,
+            max=100,
+            metavar="N",
+            help="How many UAVs' agents share a process, which costs less memory and processor "
+            "time; when it dies, all of them are gone. Not with keys, and not for vehicles that "
+            "run already.",
         ),
     ] = 1,
     link: LinkOption = LinkKind.NORMAL,
@@ -205,8 +218,8 @@ def run(
             min=1.0,
             metavar="S",
             help="UAVs that are not airborne by then are given up; mission seconds, or wall "
-            "seconds where the mission runs faster. Default: 120 for simulated autopilots, "
-            "else 300.",
+            "seconds where the mission runs faster. Default: 120 for simulated autopilots, more "
+            "for more than 100 UAVs, else 300.",
         ),
     ] = None,
     dashboard: Annotated[
@@ -303,7 +316,9 @@ def run(
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ, kinds_of(mission))
     check_speedup(autopilots, speedup)
     if isinstance(autopilots, SimulatedAutopilots) and not any_size:
-        _check_size(scenario, len(uavs))
+        _check_size(scenario, len(uavs), agents_per_process)
+    if agents_per_process > 1:
+        _check_sharing(autopilots, bus, secure=secure or keys is not None)
     passthrough = PassthroughOptions(
         command=parse_command_styles(command, uavs),
         forward=tuple(forward or ()),
@@ -331,6 +346,7 @@ def run(
         acceptance_radius_m=acceptance_radius_m or defaults.acceptance_radius_m,
         start_timeout_s=start_timeout_s or defaults.start_timeout_s,
         routers=routers,
+        agents_per_process=agents_per_process,
         link=link,
         autopilots=autopilots,
         passthrough=passthrough,
@@ -362,13 +378,35 @@ def _fly(
         return asyncio.run(run_until_stopped(shown.fly(options)))
 
 
-def _check_size(scenario: Path, n_uav: int) -> None:
-    """Refuse a fleet that this machine cannot fly, before anything starts."""
-    from sim.fleet.capacity import memory_bytes, too_large, usable_cores
+def _check_sharing(autopilots: Autopilots, bus: str, *, secure: bool) -> None:
+    """Refuse to let UAVs share a process that are to depend on nothing but their own."""
+    from sim.fleet.autopilots import RunningVehicles
 
-    if (reason := too_large(n_uav, usable_cores(), memory_bytes())) is not None:
-        remedy = "fly it on several machines (deploy/README.md), or all the same with --any-size"
-        raise InputError(Fault(str(scenario), "uav", reason, remedy))
+    problem = None
+    if isinstance(autopilots, RunningVehicles):
+        problem = "vehicles that run already have a process each"
+    elif secure:
+        problem = "each UAV has keys of its own, and a process those of one"
+    elif bus == "mesh":
+        problem = "in a mesh each UAV has a process of its own"
+    if problem is not None:
+        raise InputError(Fault("--agents-per-process", "", problem, "leave it out"))
+
+
+def _check_size(scenario: Path, n_uav: int, agents_per_process: int) -> None:
+    """Refuse a fleet that this machine cannot fly, before anything starts."""
+    from sim.fleet.capacity import MANY, memory_bytes, too_large, usable_cores
+    from sim.fleet.layout import VEHICLES_PER_PROCESS
+
+    cores, room_bytes = usable_cores(), memory_bytes()
+    reason = too_large(n_uav, cores, room_bytes, agents_per_process)
+    if reason is None:
+        return
+    shared = too_large(n_uav, cores, room_bytes, MANY) is None
+    way = f"let UAVs share processes with --agents-per-process {VEHICLES_PER_PROCESS}"
+    way = way if shared else "fly it on several machines (deploy/README.md)"
+    remedy = f"{way}, or all the same with --any-size"
+    raise InputError(Fault(str(scenario), "uav", reason, remedy))
 
 
 def _bus_kind(text: str) -> BusKind:

@@ -11,10 +11,19 @@ from typing import Any
 import numpy as np
 
 from sim.fleet.autopilots import RunningVehicles, SimulatedAutopilots, VehiclePlace
+from sim.fleet.capacity import usable_cores
 from sim.fleet.child_process import ChildProcess, ProgramEnvironment
 from sim.fleet.firmware import SitlFirmware
 from sim.fleet.fork_server import PRELOADED, PRELOADED_FOR_KEYS, ForkServer
-from sim.fleet.layout import DASHBOARD, DialedLink, LaunchOptions, Layout, autopilot_groups
+from sim.fleet.layout import (
+    DASHBOARD,
+    DialedLink,
+    LaunchOptions,
+    Layout,
+    agent_groups,
+    autopilot_groups,
+)
+from sim.fleet.start_pace import AT_ONCE_PER_CORE, StartPace
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 
@@ -28,8 +37,8 @@ class Launcher:
     """The processes of one run.
 
     They are called ``router 1`` and so on, ``the dashboard``, ``coordinator``, ``autopilot of …``,
-    and by the id of their UAV. Use from one asyncio loop; `stop` in ``finally`` ends whatever is
-    left::
+    and by the id of their UAV, or of each of their UAVs. Use from one asyncio loop; `stop` in
+    ``finally`` ends whatever is left::
 
         launch = Launcher(mission, options)
         try:
@@ -70,11 +79,13 @@ class Launcher:
         self._current: dict[str, ChildProcess] = {}
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._server: ForkServer | None = None
+        self._pace = StartPace(AT_ONCE_PER_CORE * usable_cores())
 
     async def start(self) -> None:
         """Start everything, in the order in which one needs the other.
 
-        Returns when all have been started; routers and autopilots serve by then.
+        Returns when all have been started; routers and autopilots serve by then. Of agents only
+        few join at the same time.
 
         Raises:
             ChildFailedError: a router, the dashboard or an autopilot did not come up.
@@ -106,9 +117,14 @@ class Launcher:
             case RunningVehicles(places):
                 vehicles = _there(places)
         await self._start(COORDINATOR, layout.coordinator())
-        async for place in vehicles:
-            arguments = layout.agent(place.uav, place.url, place.system_id)
-            await self._start(place.uav, arguments)
+        # Whoever comes later in a mission flies higher, and climbs for longer before it starts.
+        for group in reversed(agent_groups([place async for place in vehicles], self.options)):
+            await self._pace.room()
+            uavs = [place.uav for place in group]
+            name = uavs[0] if len(uavs) == 1 else f"agents of {uavs[0]} to {uavs[-1]}"
+            child = await self._start(name, layout.agents(group))
+            self._current.update(dict.fromkeys(uavs, child))
+            self._pace.started(child, len(group))
 
     async def _start_simulated(self) -> AsyncIterator[VehiclePlace]:
         """Start simulated autopilots; the vehicles come as they are ready."""
@@ -152,6 +168,7 @@ class Launcher:
 
         Agents first: each sees its vehicle return, which takes an autopilot.
         """
+        self._pace.close()
         for child in self._current.values():
             if child.returncode is None:
                 child.resume()
@@ -198,7 +215,9 @@ class Launcher:
         if former.setting is not None or former.arguments[0] == "autopilot":
             raise ValueError(f"{name} cannot be restarted: its vehicles would be back at the start")
         await former.kill()
-        child = await self._start(name, list(former.arguments))
+        child = await self._start(former.name, list(former.arguments))
+        same = [each for each, process in self._current.items() if process is former]
+        self._current.update(dict.fromkeys(same, child))
         if name in self.layout.routers:
             await child.ready()
         return child

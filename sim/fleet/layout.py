@@ -11,7 +11,12 @@ from pathlib import Path
 import numpy as np
 
 from coordinator.dashboard.access import ServeAddress
-from sim.fleet.autopilots import Autopilots, RunningVehicles, SimulatedAutopilots
+from sim.fleet.autopilots import (
+    Autopilots,
+    RunningVehicles,
+    SimulatedAutopilots,
+    VehiclePlace,
+)
 from sim.fleet.firmware import SitlFirmware
 from sim.fleet.keys import RunKeys
 from sim.fleet.passthrough import PassthroughOptions
@@ -22,7 +27,7 @@ from swarm.identity import load_identity
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 from swarm.model.layers import HIGHEST_M, FlightLayers, layers_below, layers_over
-from swarm.protocol.timing import LinkKind, preset
+from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind, LinkPreset, Timing, preset
 from swarm.runtime.log import LogFormat
 
 AUTO_MESH_LIMIT = 16
@@ -33,6 +38,12 @@ VEHICLES_PER_PROCESS = 25
 """Simulated autopilots in one process of a larger fleet."""
 LEAST_POSITION_RATE_HZ = 5.0
 """Wall rate of position reports of the largest fleets."""
+START_S_PER_UAV = 1.2
+"""Simulated vehicles get that long for each of the fleet to get airborne, and as many others wait
+in the air for them, where that is longer than usual: one machine starts them all."""
+LARGE_LEASE_S = PRESETS[LinkKind.BAD].lease_s
+"""Lease of fleets of more than `UNSTRETCHED_UAVS`, on any link: on one machine links never fail by
+themselves, but a process may wait for a processor for seconds while all others start."""
 ONLOOKER = "onlooker"
 DASHBOARD = "the dashboard"
 """What its process is called; no UAV can be."""
@@ -46,11 +57,12 @@ class BusKind(StrEnum):
     MESH = "mesh"
     ROUTER = "router"
 
-    def for_fleet(self, n_uav: int) -> BusKind:
-        """The kind itself, or what suits a fleet of that size."""
+    def for_fleet(self, n_uav: int, agents_per_process: int = 1) -> BusKind:
+        """The kind itself, or what suits a fleet of that size; in a mesh each has a process."""
         if self is not BusKind.AUTO:
             return self
-        return BusKind.MESH if n_uav <= AUTO_MESH_LIMIT else BusKind.ROUTER
+        suits_mesh = n_uav <= AUTO_MESH_LIMIT and agents_per_process == 1
+        return BusKind.MESH if suits_mesh else BusKind.ROUTER
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +93,8 @@ class LaunchOptions:
     """What a line of a process's log looks like."""
     dashboard: ServeAddress | None = None
     """Where a page shows the run; nowhere if None."""
+    agents_per_process: int = 1
+    """How many UAVs' agents share a process."""
     keys: RunKeys | None = None
     """With which the processes prove who they are; None: whoever reaches the bus is believed."""
     router_file: Path | None = None
@@ -89,6 +103,10 @@ class LaunchOptions:
     def __post_init__(self) -> None:
         if not 1 <= self.routers <= MAX_ROUTERS:
             raise ValueError(f"routers must be within 1..{MAX_ROUTERS}, not {self.routers}")
+        if self.agents_per_process < 1:
+            raise ValueError(f"agents_per_process must be >= 1, not {self.agents_per_process}")
+        if self.agents_per_process > 1 and (self.bus is BusKind.MESH or self.keys is not None):
+            raise ValueError("in a mesh, and with keys, each agent has a process of its own")
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,7 +139,7 @@ class Layout:
         self._seats = [COORDINATOR, *(uav.id for uav in mission.uavs)]
         pages = [] if options.dashboard is None else [DASHBOARD]
         self._observers = [ONLOOKER, *pages, *observers]
-        kind = options.bus.for_fleet(len(mission.uavs))
+        kind = options.bus.for_fleet(len(mission.uavs), options.agents_per_process)
         count = options.routers if kind is BusKind.ROUTER else 0
         self.routers = tuple(f"router {number}" for number in range(1, count + 1))
         """Names of the routers; none in a mesh."""
@@ -150,7 +168,7 @@ class Layout:
 
     def observer_seat(self, name: str = ONLOOKER) -> BusConfig:
         """Seat of the launcher itself, or of another observer."""
-        dialed, lease_s = self._dialed(name), preset(self._options.link).lease_s
+        dialed, lease_s = self._dialed(name), self._network.lease_s
         topology: Topology
         if self.routers:
             topology = ClientTopology(dialed)
@@ -188,8 +206,7 @@ class Layout:
             *listen,
             *dialed,
             *trust,
-            "--link",
-            self._options.link,
+            *self._link(),
             *self._log(),
         ]
 
@@ -214,6 +231,7 @@ class Layout:
             str(options.scenario),
             *("--method", options.method, "--seed", str(options.seed), "--json"),
             *("--start-timeout-s", repr(options.start_timeout_s)),
+            *("--hover-s", repr(self._hover_s)),
             *("--layer-spacing-m", repr(flight_layers(self._mission, options).spacing_m)),
             *self._log(),
             *self._memory(),
@@ -233,12 +251,18 @@ class Layout:
 
     def agent(self, uav: str, url: str, system_id: int) -> list[str]:
         """Arguments of the agent of ``uav``."""
-        options = self._options
+        return self.agents([VehiclePlace(uav, url, system_id)])
+
+    def agents(self, places: Sequence[VehiclePlace]) -> list[str]:
+        """Arguments of the process that is the agent of all these, one of `agent_groups`."""
+        options, uav = self._options, places[0].uav
         rate_hz = options.position_rate_hz / options.speedup
         return [
             "agent",
-            *("--mission", self._mission.name, "--uav", uav),
-            *("--mavlink", url, "--system-id", str(system_id)),
+            *("--mission", self._mission.name),
+            *_repeated("--uav", [place.uav for place in places]),
+            *_repeated("--mavlink", [place.url for place in places]),
+            *_repeated("--system-id", [str(place.system_id) for place in places]),
             *("--position-rate-hz", repr(rate_hz)),
             *("--acceptance-radius-m", repr(options.acceptance_radius_m)),
             *options.passthrough.to_agent(uav),
@@ -247,6 +271,27 @@ class Layout:
             *self._speed(),
             *self.seat_arguments(uav),
         ]
+
+    @property
+    def _network(self) -> LinkPreset:
+        """Timers and lease of all processes."""
+        usual = preset(self._options.link)
+        if len(self._mission.uavs) <= UNSTRETCHED_UAVS or usual.lease_s >= LARGE_LEASE_S:
+            return usual
+        return preset(self._options.link, LARGE_LEASE_S)
+
+    @property
+    def _hover_s(self) -> float:
+        """How long the first in the air wait for the last [wall s]; simulated ones may for long."""
+        usual_s = Timing().hover_s
+        if not isinstance(self._options.autopilots, SimulatedAutopilots):
+            return usual_s
+        return max(usual_s, START_S_PER_UAV * len(self._mission.uavs))
+
+    def _link(self) -> list[str]:
+        kind, lease_s = self._options.link, self._network.lease_s
+        own = [] if lease_s == preset(kind).lease_s else ["--lease-s", repr(lease_s)]
+        return ["--link", kind, *own]
 
     def _log(self) -> list[str]:
         form = self._options.log_format
@@ -267,7 +312,7 @@ class Layout:
     def seat_arguments(self, name: str) -> list[str]:
         """Arguments with which a process, or an observer by that name, finds the bus."""
         rest = [*_repeated("--connect", self._dialed(name)), *self._trust(name)]
-        rest += ["--link", self._options.link]
+        rest += self._link()
         if self.routers:
             return ["--bus", "router", *rest]
         return ["--bus", "mesh", "--listen", self._endpoints[name], *rest]
@@ -348,7 +393,8 @@ def defaults_for(autopilots: Autopilots, n_uav: int) -> RunDefaults:
     """
     match autopilots:
         case SimulatedAutopilots():
-            return RunDefaults(default_position_rate_hz(n_uav), 0.5, 120.0)
+            timeout_s = max(120.0, START_S_PER_UAV * n_uav)
+            return RunDefaults(default_position_rate_hz(n_uav), 0.5, timeout_s)
         case SitlFirmware():
             return RunDefaults(min(50.0, 500.0 / max(1, n_uav)), 2.0, 300.0)
         case RunningVehicles():
@@ -359,3 +405,19 @@ def autopilot_groups(uavs: Sequence[str]) -> list[list[str]]:
     """UAVs whose simulated autopilots share a process."""
     size = 1 if len(uavs) <= OWN_AUTOPILOT_LIMIT else VEHICLES_PER_PROCESS
     return [list(uavs[first : first + size]) for first in range(0, len(uavs), size)]
+
+
+def agent_groups(
+    places: Sequence[VehiclePlace], options: LaunchOptions
+) -> list[list[VehiclePlace]]:
+    """UAVs whose agents share a process: neighbours in the mission that are told the same."""
+    groups: list[list[VehiclePlace]] = []
+    told_before: list[str] = []
+    for place in places:
+        told = options.passthrough.to_agent(place.uav)
+        if groups and told == told_before and len(groups[-1]) < options.agents_per_process:
+            groups[-1].append(place)
+        else:
+            groups.append([place])
+        told_before = told
+    return groups

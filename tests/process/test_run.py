@@ -87,6 +87,28 @@ def assert_every_line_tells_whose_it_is(logs: Path) -> None:
     assert len({(each["uav"], each["decision"]) for each in decided}) >= 8
 
 
+def test_agents_that_share_a_process_fly_as_others_do(tmp_path: Path) -> None:
+    logs, scenario = tmp_path / "logs", tmp_path / "scenario.toml"
+    scenario.write_text(format_scenario(survey(5, 15, side_m=400.0)))
+    arguments = [str(scenario), "--agents-per-process", "3", "--logs", str(logs)]
+    with SwarmRun([*arguments, "--speedup", f"{pace(6.0):g}"], tmp_path) as run:
+        status, told = run.result()
+
+        assert status == 0, run.story()
+        assert len(told["done"]) == 15
+        assert told["lost_uavs"] == []
+        lines = {
+            path.stem: [json.loads(line) for line in path.read_text().splitlines()]
+            for path in logs.glob("agents*")
+        }
+        assert {name: {each["uav"] for each in said} for name, said in lines.items()} == {
+            "agents-of-uav01-to-uav03": {"uav01", "uav02", "uav03"},
+            "agents-of-uav04-to-uav05": {"uav04", "uav05"},
+        }
+        scenario.unlink()
+        run.assert_nothing_left(but="logs")
+
+
 def test_killed_agents_tasks_are_done_by_the_others(tmp_path: Path) -> None:
     scenario = tmp_path / "scenario.toml"
     scenario.write_text(format_scenario(survey(5, 15, side_m=800.0)))

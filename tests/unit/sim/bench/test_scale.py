@@ -14,6 +14,7 @@ from rich.console import Console
 
 from agent.links.mavlink_vehicle import TURNAROUNDS
 from coordinator.mission_view.mission_state import MissionState
+from sim.bench import scale
 from sim.bench.machine import share_bytes, this_machine
 from sim.bench.plan_report import write_figure
 from sim.bench.scale import (
@@ -26,6 +27,8 @@ from sim.bench.scale import (
     received_hz,
 )
 from sim.bench.scale_figure import scale_figure
+from sim.fleet import capacity
+from swarm.cli import main
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import MessageReceived, Tick
 from tests.support.builders import TIMING, choice, epoch, held, message, mission, status, task, uav
@@ -121,3 +124,21 @@ def test_no_message_at_all_is_no_fault() -> None:
 @pytest.mark.skipif(not Path("/proc/self/smaps_rollup").exists(), reason="Linux alone tells it")
 def test_the_share_of_memory_is_that_of_a_process() -> None:
     assert 1e6 < share_bytes(os.getpid()) < 1e11
+
+
+def test_a_fleet_too_large_for_the_machine_is_told_so_first(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    told: list[str] = []
+
+    def measured(settings: ScaleSettings, tell: object) -> ScaleBench:
+        del settings, tell
+        told.append(capsys.readouterr().err)
+        return BENCH
+
+    monkeypatch.setattr(capacity, "usable_cores", lambda: 1)
+    monkeypatch.setattr(scale, "measure_scale", measured)
+
+    assert main(["bench", "scale", "--sizes", "2,500"]) == 0
+    assert told[0].startswith("warning: 500 UAVs, and 1 core can fly about ")
+    assert told[0].count("\n") == 1

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from sim.fleet import capacity
-from sim.fleet.capacity import BYTES_PER_UAV, CPU_FRAC_PER_UAV, too_large
+from sim.fleet.capacity import BYTES_PER_UAV, CPU_FRAC_PER_UAV, MANY, too_large
 from swarm.cli import main
 
 GIB = 1 << 30
@@ -32,6 +32,14 @@ def test_what_fits_is_no_matter_and_one_more_is_told() -> None:
     )
 
 
+def test_a_machine_flies_more_whose_agents_share_processes() -> None:
+    most = int(2 / CPU_FRAC_PER_UAV)
+
+    assert too_large(most + 1, 2, 1000 * GIB, MANY - 1) is not None
+    assert too_large(most + 1, 2, 1000 * GIB, MANY) is None
+    assert too_large(2 * most, 2, 1000 * GIB, MANY) is not None
+
+
 def test_memory_counts_where_it_is_known() -> None:
     assert too_large(50, 64, 50 * BYTES_PER_UAV) is not None
     assert too_large(50, 64, 0) is None
@@ -54,5 +62,16 @@ def test_a_run_of_too_many_ends_with_one_line(
     assert main(["run", str(crowd(tmp_path, 200))]) == 2
     told = capsys.readouterr().err
     assert "200 UAVs, and 1 core can fly about" in told
+    assert "several machines" in told
     assert "--any-size" in told
     assert len(told.strip().splitlines()) == 1
+
+
+def test_a_run_that_fits_where_agents_share_processes_is_told_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(capacity, "usable_cores", lambda: 1)
+
+    assert main(["run", str(crowd(tmp_path, 100))]) == 2
+    told = capsys.readouterr().err
+    assert "share processes with --agents-per-process 25, or all the same with --any-size" in told

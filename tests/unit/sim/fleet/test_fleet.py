@@ -7,27 +7,34 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from agent.vehicle.config import CommandStyle
 from coordinator.dashboard.access import ServeAddress
-from sim.fleet.autopilots import RunningVehicles
+from sim.fleet.autopilots import RunningVehicles, SimulatedAutopilots, VehiclePlace
 from sim.fleet.keys import RunKeys
 from sim.fleet.layout import (
     AUTO_MESH_LIMIT,
+    LARGE_LEASE_S,
     LEAST_POSITION_RATE_HZ,
     ONLOOKER,
     BusKind,
     LaunchOptions,
     Layout,
+    agent_groups,
     autopilot_groups,
     default_position_rate_hz,
+    defaults_for,
     flight_layers,
 )
+from sim.fleet.passthrough import PassthroughOptions
 from swarm.bus.config import ClientTopology, MeshTopology
 from swarm.model.ids import COORDINATOR
 from swarm.model.layers import FlightLayers
+from swarm.protocol.timing import LinkKind
 from tests.support.builders import MISSION, mission, task, uav
 
 OPTIONS = LaunchOptions(
@@ -140,6 +147,68 @@ def test_of_every_two_routers_one_dials_the_other() -> None:
     assert len(set(endpoints)) == 3
     dialed = [values(made.router(name), "--connect") for name in made.routers]
     assert dialed == [[], endpoints[:1], endpoints[:2]]
+
+
+def large_layout(n_uav: int, **changes: Any) -> Layout:
+    fleet = mission([uav(f"u{number:03}") for number in range(n_uav)], [task("t0", 1.0)])
+    return Layout(replace(OPTIONS, **changes), fleet, np.random.default_rng(0))
+
+
+def test_links_of_a_large_fleet_outlast_its_start() -> None:
+    large, small = large_layout(26, bus=BusKind.ROUTER), large_layout(25, bus=BusKind.ROUTER)
+
+    for arguments in (large.router("router 1"), large.coordinator(), large.agent("u001", "", 1)):
+        assert float(value(arguments, "--lease-s")) == LARGE_LEASE_S
+        assert value(arguments, "--link") == "normal"
+    assert large.observer_seat().lease_s == LARGE_LEASE_S
+    assert "--lease-s" not in small.coordinator()
+    assert small.observer_seat().lease_s < LARGE_LEASE_S
+    assert "--lease-s" not in large_layout(26, link=LinkKind.BAD).coordinator()
+
+
+def test_the_first_of_a_large_simulated_fleet_wait_for_the_last() -> None:
+    hovers_s = [float(value(large_layout(n).coordinator(), "--hover-s")) for n in (10, 50, 200)]
+    real = RunningVehicles((VehiclePlace("u000", "udp:1", 1),))
+    of_real = large_layout(200, autopilots=real).coordinator()
+
+    assert hovers_s == [60.0, 60.0, 240.0]
+    assert float(value(of_real, "--hover-s")) == 60.0
+    assert defaults_for(SimulatedAutopilots(), 100).start_timeout_s == 120.0
+    assert defaults_for(SimulatedAutopilots(), 200).start_timeout_s == 240.0
+
+
+def test_neighbours_that_are_told_the_same_share_a_process() -> None:
+    places = [VehiclePlace(f"u{number}", f"tcp:127.0.0.1:{number}", number) for number in range(7)]
+    other = PassthroughOptions(command={"u3": CommandStyle.MISSION})
+    sharing = replace(OPTIONS, bus=BusKind.ROUTER, agents_per_process=2)
+
+    def sizes(options: LaunchOptions) -> list[int]:
+        groups = agent_groups(places, options)
+        assert [place for group in groups for place in group] == places
+        return [len(group) for group in groups]
+
+    assert sizes(OPTIONS) == [1] * 7
+    assert sizes(sharing) == [2, 2, 2, 1]
+    assert sizes(replace(sharing, passthrough=other)) == [2, 1, 1, 2, 1]
+
+
+def test_a_process_of_several_agents_is_told_of_each() -> None:
+    places = [VehiclePlace("u0", "tcp:127.0.0.1:7", 4), VehiclePlace("u1", "tcp:127.0.0.1:8", 5)]
+    options = replace(OPTIONS, agents_per_process=2)
+    made = Layout(options, FLEET, np.random.default_rng(0))
+    arguments = made.agents(places)
+
+    assert made.routers == ("router 1",)  # in a mesh each listens for itself
+    assert values(arguments, "--uav") == ["u0", "u1"]
+    assert values(arguments, "--mavlink") == ["tcp:127.0.0.1:7", "tcp:127.0.0.1:8"]
+    assert values(arguments, "--system-id") == ["4", "5"]
+    assert arguments.count("--connect") == 1
+
+
+@pytest.mark.parametrize("changes", [{"bus": BusKind.MESH}, {"keys": KEYS}])
+def test_agents_with_places_or_keys_of_their_own_share_no_process(changes: dict[str, Any]) -> None:
+    with pytest.raises(ValueError, match="each agent has a process of its own"):
+        replace(OPTIONS, agents_per_process=2, **changes)
 
 
 def test_clients_take_turns_in_the_router_they_prefer_and_know_all() -> None:
