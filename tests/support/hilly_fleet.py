@@ -11,7 +11,7 @@ from tests.support.hills import hills
 _HALF_M = 180.0
 
 
-def hilly_mission(seed: int, *, layers: int = 3, n_uav: int = 4, n_task: int = 8) -> Mission:
+def hilly_mission(seed: int, *, layers: int = 3, n_uav: int = 6, n_task: int = 18) -> Mission:
     """UAVs at the western edge, tasks up to the eastern: one a line, half of them with heights."""
     rng = np.random.default_rng(seed)
     terrain = hills(seed)
