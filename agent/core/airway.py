@@ -405,10 +405,7 @@ class Airway:
             self._way = asked
 
     def _make_room(self, air: SharedAir, now_s: float) -> bool:
-        """Step aside for who asks for where this UAV hovers, unless it is at work.
-
-        Gives whether there is anybody to step aside for.
-        """
+        """Step aside for who asks for where it hovers, unless it is at work; whether there is one."""
         here, claims = hovering(self._told_way), self._claims()
         works = self._wish is None and claims[self._uav].phase is not ClaimPhase.IDLE
         if self._moves or not self._aloft or not here.path_enu_m or works:
@@ -417,8 +414,10 @@ class Airway:
         for uav in air.in_the_way(self._uav, place, claims, self._fleet.expired()):
             if self._wish is not None and strength(self._uav, claims) < strength(uav, claims):
                 continue
-            corner = self._nominal(here.path_enu_m[0])
-            self._aside = Wish(GoTo(STOP_LEG, corner), now_s, (corner,))
+            high, corner = self._at_own_height, self._nominal(here.path_enu_m[0])
+            if high:  # layers count from the ground, and not from the height of a task
+                corner = self._fleet.in_own_layer(corner)
+            self._aside = Wish(GoTo(STOP_LEG, corner), now_s, (corner,), out_of_layer=high)
             return True
         return False
 

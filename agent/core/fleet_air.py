@@ -147,7 +147,11 @@ class FleetAir:
             yield from ((shift_m, wish.corners_enu_m) for shift_m in shifts_m)
             return
         (east_m, north_m, up_m), *_ = wish.corners_enu_m
-        others_m = [shift_m for shift_m in shifts_m if abs(shift_m - now_shift_m) > 1e-6]
+        others_m = [
+            shift_m
+            for shift_m in shifts_m
+            if wish.out_of_layer or abs(shift_m - now_shift_m) > 1e-6
+        ]
         yield from ((shift_m, wish.corners_enu_m[:1]) for shift_m in others_m)
         if self._brief is not None and self._brief.terrain is not None:
             return
@@ -157,6 +161,19 @@ class FleetAir:
                 there = east_m + away_m * math.cos(angle), north_m + away_m * math.sin(angle), up_m
                 if self._is_clear(wish.corners_enu_m[0], there):
                     yield from ((shift_m, (wish.corners_enu_m[0], there)) for shift_m in shifts_m)
+
+    def in_own_layer(self, place_enu_m: Point) -> Point:
+        """Above that place or below it, in the own layer [m]."""
+        east_m, north_m, up_m = place_enu_m
+        me, brief = self._mission_view.me, self._brief
+        if me is None or brief is None:
+            return place_enu_m
+        up_m = me.layer_m
+        if brief.terrain is not None:
+            from swarm.allocation.legs.ground import ground_of
+
+            up_m += ground_of(brief.terrain.terrain()).one_up_m(east_m, north_m)
+        return east_m, north_m, up_m
 
     def begin_at(self, wish: Wish, place_enu_m: Point) -> None:
         """The UAV, which has made room, waits there for its way [m; in its own layer].

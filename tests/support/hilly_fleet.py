@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from swarm.allocation.legs.ground import ground_of
@@ -43,4 +45,25 @@ def hilly_mission(seed: int, *, layers: int = 3, n_uav: int = 6, n_task: int = 1
         terrain=terrain,
         separation_m=separation_m,
         band_m=(low_m, low_m + (layers - 1) * (separation_m + 2.0) + 1.0),
+    )
+
+
+def levelled(mission: Mission) -> Mission:
+    """The same on flat ground."""
+
+    def flat(place: tuple[float, float, float]) -> tuple[float, float, float]:
+        return place[0], place[1], 0.0
+
+    return replace(
+        mission,
+        terrain=None,
+        uavs=tuple(replace(uav, position_enu_m=flat(uav.position_enu_m)) for uav in mission.uavs),
+        tasks=tuple(
+            replace(
+                task,
+                position_enu_m=flat(task.position_enu_m),
+                path_enu_m=tuple(map(flat, task.path_enu_m)),
+            )
+            for task in mission.tasks
+        ),
     )

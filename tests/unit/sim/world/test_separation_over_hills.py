@@ -12,7 +12,7 @@ from sim.world.uncertainty import Uncertainty
 from swarm.model import Mission
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
-from tests.support.hilly_fleet import hilly_mission
+from tests.support.hilly_fleet import hilly_mission, levelled
 
 
 def fly(mission: Mission) -> SimulatedMission:
@@ -71,3 +71,16 @@ def test_the_air_of_a_lost_keeper_is_still_shared(seed: int) -> None:
     assert_kept(mission, flown)
     assert len(flown.lost_because) == 1
     assert sorted(flown.result.done) == sorted(task.id for task in mission.tasks)
+
+
+@pytest.mark.parametrize("seed", [4, 7])
+def test_who_makes_room_from_the_height_of_a_task_goes_to_a_layer(seed: int) -> None:
+    """Not as far from there as that layer is from its own: lower than anything was to be flown."""
+    mission = levelled(hilly_mission(seed))
+    flown = fly(mission)
+
+    assert mission.band_m is not None
+    asked_m = [mission.band_m[0], *(task.height_m for task in mission.tasks if task.height_m)]
+    tracks = flown.world.tracks.values()
+    flown_m = [piece.place_enu_m[2] for track in tracks for piece in track.pieces()]
+    assert min(flown_m) >= min(asked_m) - 1e-6
