@@ -7,7 +7,8 @@
     flight = swarm.simulate(mission, plan, loss=0.3, seed=1)
     print(flight.objective / plan.objective, flight.lost_uavs)
 
-A rule of one's own is a function of a `Turn`; plans and flights take it like a method's name:
+A rule of one's own, a `DecisionRule`, is a function of a `Turn`; plans and flights take it like a
+method's name:
 
     def nearest(turn: swarm.Turn) -> swarm.Task | None:
         return min(turn.open, key=turn.travel_s)
