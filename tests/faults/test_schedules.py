@@ -14,7 +14,7 @@ from sim.faults.soak import Breach, first_breach, shrunk
 from tests.support.seeds import seeds, sweeps
 
 BLOCK = 20
-QUICK, BLOCKS = 4, 15
+QUICK, BLOCKS = 3, 15
 """Blocks of every run of the tests, and of those of the night."""
 
 
@@ -41,7 +41,7 @@ def test_every_kind_of_fault_is_survived_by_uavs_that_speed_up_slowly(block: int
     assert told(breach) == ""
 
 
-@pytest.mark.parametrize("sweep", sweeps(4, 16))
+@pytest.mark.parametrize("sweep", sweeps(3, 16))
 @pytest.mark.parametrize("kind", PLAIN_KINDS)
 def test_each_kind_alone_is_survived(kind: DisturbanceKind, sweep: range) -> None:
     breach = first_breach([100_000 + seed for seed in sweep], (kind,))

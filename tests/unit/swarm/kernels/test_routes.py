@@ -319,9 +319,9 @@ def test_thousands_of_tasks_are_searched_alike_by_any_number_of_threads(survival
     problem = random_problem(rng, 60, 2100, lowest_survival=survival, horizon_s=400.0)
     team = team_of(problem)
 
-    runs = [optimise_routes(team, iterations=4000, threads=n) for n in (1, 2, 3)]
+    runs = [optimise_routes(team, iterations=2000, threads=n) for n in (1, 3)]
 
     lists, worth = runs[0]
-    assert runs[1] == runs[2] == runs[0]
+    assert runs[1] == runs[0]
     assert sorted(task for route in lists for task in route) == list(range(2100))
     assert evaluate(problem, lists)[0] == pytest.approx(worth, rel=1e-12)
