@@ -7,7 +7,6 @@ By a client of our own, and by MAVProxy where `SWARM_MAVPROXY` names it, such as
 from __future__ import annotations
 
 import contextlib
-import json
 import os
 import re
 import shutil
@@ -19,10 +18,9 @@ from typing import Self
 import pytest
 
 from agent.vehicle.station_desk import ASK, CONFIRM, WISHES
-from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.by_hand import ByHand
+from tests.process.long_fleet import UAVS, does, long_mission_of_three
 from tests.process.mission import wait_until
-from tests.process.programs import run_swarm
 from tests.support.udp_station import UdpStation, hostile_words
 
 pytestmark = [pytest.mark.process]
@@ -30,24 +28,7 @@ pytestmark = [pytest.mark.process]
 LIMIT_S = 120.0
 HOLD, RESUME, RETURN, _, ABORT = WISHES
 ACCEPTED, NOT_NOW = 0, 1
-UAVS = ["uav1", "uav2", "uav3"]
-MISSION = Mission(
-    "shown",
-    9000.0,
-    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 5.0) for n, u in enumerate(UAVS)),
-    tuple(
-        Task(TaskId(f"t{n}"), (20.0 * n, 60.0, 0.0), 1.0, service_s=900.0)
-        for n in range(2 * len(UAVS))
-    ),
-    origin=Origin(46.8, 9.7, 1100.0),
-)
 MAVPROXY = os.environ.get("SWARM_MAVPROXY")
-
-
-def does(by_hand: ByHand, uav: str) -> str:
-    told = json.loads(run_swarm("status", "--json", *by_hand.seat).stdout)
-    (found,) = [each["does"] for each in told["uavs"] if each["id"] == uav]
-    return str(found)
 
 
 @contextlib.contextmanager
@@ -55,7 +36,8 @@ def shown(folder: Path, url: str) -> Iterator[ByHand]:
     """Three vehicles of a fleet that is under way, shown to a ground station."""
     with contextlib.ExitStack() as stack:
         options = ["--forward", url, "--station-actions"]
-        by_hand = ByHand(folder, stack, MISSION, speedup=4, agent_options=options)
+        mission = long_mission_of_three("shown")
+        by_hand = ByHand(folder, stack, mission, speedup=4, agent_options=options)
         by_hand.coordinator("coordinator")
         for uav in UAVS:
             by_hand.wait_for(uav, "event=decided")

@@ -4,43 +4,19 @@ from __future__ import annotations
 
 import contextlib
 import json
-import subprocess
 from pathlib import Path
 
 import pytest
 
-from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.by_hand import ByHand
-from tests.process.programs import run_swarm
+from tests.process.long_fleet import UAVS, does, long_mission_of_three, swarm
 
 pytestmark = [pytest.mark.process]
-
-UAVS = ["uav1", "uav2", "uav3"]
-MISSION = Mission(
-    "commanded",
-    9000.0,
-    tuple(Uav(UavId(u), (12.0 * n, 0.0, 0.0), 5.0) for n, u in enumerate(UAVS)),
-    tuple(
-        Task(TaskId(f"t{n}"), (20.0 * n, 60.0, 0.0), 1.0, service_s=900.0)
-        for n in range(2 * len(UAVS))
-    ),
-    origin=Origin(46.8, 9.7, 1100.0),
-)
-
-
-def swarm(by_hand: ByHand, *words: str) -> subprocess.CompletedProcess[str]:
-    return run_swarm(*words, *by_hand.seat)
-
-
-def does(by_hand: ByHand, uav: str) -> str:
-    told = json.loads(swarm(by_hand, "status", "--json").stdout)
-    (found,) = [each["does"] for each in told["uavs"] if each["id"] == uav]
-    return str(found)
 
 
 def test_an_operator_commands_a_fleet_without_a_coordinator(tmp_path: Path) -> None:
     with contextlib.ExitStack() as stack:
-        by_hand = ByHand(tmp_path, stack, MISSION, speedup=4)
+        by_hand = ByHand(tmp_path, stack, long_mission_of_three("commanded"), speedup=4)
         coordinator = by_hand.coordinator("coordinator")
         for uav in UAVS:
             by_hand.wait_for(uav, "event=decided")

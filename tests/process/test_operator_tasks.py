@@ -10,7 +10,7 @@ import pytest
 
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
 from tests.process.by_hand import ByHand
-from tests.process.test_operator import swarm
+from tests.process.long_fleet import swarm
 
 pytestmark = [pytest.mark.process]
 
