@@ -146,8 +146,8 @@ async def live_together(
         first = asyncio.FIRST_COMPLETED
         await asyncio.wait((running[-1], waiting), timeout=join_s, return_when=first)
         waiting.cancel()
-    garbage.keep_all()  # what dozens have learned would take tens of milliseconds to look through
-    return max(await asyncio.gather(*running))
+    with garbage.kept():  # it takes tens of milliseconds to look through what dozens have learned
+        return max(await asyncio.gather(*running))
 
 
 async def _live_among_others(uav: str, life: Awaitable[int]) -> int:

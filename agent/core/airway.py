@@ -405,7 +405,7 @@ class Airway:
             self._way = asked
 
     def _make_room(self, air: SharedAir, now_s: float) -> bool:
-        """Step aside for who asks for where it hovers, unless it is at work; whether there is one."""
+        """Step aside for who asks for where it hovers, unless it works; whether there is one."""
         here, claims = hovering(self._told_way), self._claims()
         works = self._wish is None and claims[self._uav].phase is not ClaimPhase.IDLE
         if self._moves or not self._aloft or not here.path_enu_m or works:

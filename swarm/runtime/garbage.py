@@ -8,7 +8,9 @@ milliseconds, in which a vehicle may wait for its next target.
 
 from __future__ import annotations
 
+import contextlib
 import gc
+from collections.abc import Iterator
 from typing import Final
 
 _OF_A_START: Final = 200_000
@@ -30,9 +32,14 @@ def end_start() -> None:
         _go_on_as_usual()
 
 
-def keep_all() -> None:
-    """Much has been made since that stays as well: it is not looked through again, either."""
+@contextlib.contextmanager
+def kept() -> Iterator[None]:
+    """Much has been made since that stays, too: it is not looked through in this context."""
     gc.freeze()
+    try:
+        yield
+    finally:
+        gc.unfreeze()  # what is never looked through is not taken apart at the end, either
 
 
 def _at_first_search(phase: str, _info: dict[str, int]) -> None:

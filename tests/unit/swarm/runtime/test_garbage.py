@@ -56,6 +56,7 @@ def test_what_has_been_made_since_can_be_kept_as_well() -> None:
     garbage.end_start()
     frozen = gc.get_freeze_count()
     kept: list[list[object]] = [[] for _ in range(10_000)]
-    garbage.keep_all()
-    assert gc.get_freeze_count() > frozen + len(kept)
-    assert gc.get_threshold() == USUAL
+    with garbage.kept():
+        assert gc.get_freeze_count() > frozen + len(kept)
+        assert gc.get_threshold() == USUAL
+    assert gc.get_freeze_count() == 0
