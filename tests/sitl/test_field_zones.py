@@ -70,16 +70,17 @@ def status() -> dict[str, Any]:
     return dict(json.loads(said.stdout)) if said.returncode == 0 else {}
 
 
-def flying_to(run: SwarmRun, task: str) -> dict[str, Any]:
-    """What is told of the UAV that claims a task, once it is on its way there."""
+def flying_to(run: SwarmRun, task: str) -> tuple[dict[str, Any], list[str]]:
+    """What is told of the UAV that claims a task, once it is on its way there, and of zones."""
     starts = {uav.id: uav.position_enu_m for uav in meadow_with_a_lake().uavs}
-    found: list[dict[str, Any]] = []
+    found: list[tuple[dict[str, Any], list[str]]] = []
 
     def on_its_way() -> bool:
-        for uav in status().get("uavs", ()):
+        told = status()
+        for uav in told.get("uavs", ()):
             place = uav["position_enu_m"]
             if uav["task"] == task and place and math.dist(place[:2], starts[uav["id"]][:2]) > 20.0:
-                found.append(uav)
+                found.append((uav, told["zones"]))
         return bool(found)
 
     wait_until(on_its_way, 60.0, f"a UAV flies to {task}\n{run.story()}")
@@ -110,13 +111,14 @@ def test_zones_are_heeded_while_they_are_there_and_flown_through_afterwards(
         run.wait_for_line("epoch 1", timeout_s=150.0)
         flying_to(run, "far")
         assert obeyed("add", "lake", "--polygon", *(f"{x:g},{y:g}" for x, y in LAKE))
-        east_m, north_m, _ = flying_to(run, "west")["position_enu_m"]
+        uav, zones = flying_to(run, "west")
+        assert zones == ["lake"]
+        east_m, north_m, _ = uav["position_enu_m"]
         over = [
             f"{east_m + east * OVER_M:g},{north_m + north * OVER_M:g}"
             for east, north in ((-1, -1), (1, -1), (1, 1), (-1, 1))
         ]
         assert obeyed("add", "over", "--polygon", *over)
-        assert sorted(status()["zones"]) == ["lake", "over"]
         run.wait_for_line("ended far", timeout_s=150.0)
         assert obeyed("remove", "over")
         assert obeyed("remove", "lake")
