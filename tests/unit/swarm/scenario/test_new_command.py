@@ -73,7 +73,9 @@ def test_fleets_of_any_size_stand_apart_and_reach_their_tasks_in_time(
 @pytest.mark.parametrize("tasks", [0, 2])
 def test_every_field_of_the_format_is_there_with_its_meaning(tasks: int) -> None:
     text = blank_scenario(Blank("field", 2, tasks, DEFAULT_ORIGIN))
-    at = {name: text.index(f"[{name}]") for name in list(TABLES)[1:]}
+    heads = re.finditer(r"^(?:# )?\[+(\w+)\]+$", text, re.MULTILINE)  # prose names tables, too
+    first = {head[1]: head.start() for head in reversed(list(heads))}
+    at = {name: first[name] for name in list(TABLES)[1:]}
     begins = [0, *at.values(), len(text)]
     for (name, table), begin, end in zip(TABLES.items(), begins, begins[1:], strict=False):
         keys = {field.alias or key for key, field in table.model_fields.items()}
