@@ -9,8 +9,6 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
-import numpy as np
-
 STEP_M = 0.1
 """Heights are whole multiples of it above the lowest [m]."""
 MOST_STEPS = 2**16 - 1
@@ -84,6 +82,8 @@ class Terrain:
     @property
     def highest_m(self) -> float:
         """The greatest height [m above the mission origin]."""
+        import numpy as np  # most missions have no terrain, and commands start without it
+
         return self.lowest_m + STEP_M * int(np.frombuffer(self.steps, dtype="<u2").max())
 
     @property
