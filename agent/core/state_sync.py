@@ -31,6 +31,8 @@ from swarm.protocol.sync import QuestionTimer, some_of
 from swarm.protocol.timing import Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import ClaimPhase
 
+_LAST_WORDS = 3
+"""How often others are asked again what somebody who was lost has said at last."""
 _WORTH_TELLING_S = 0.1
 """A correction of the mission clock by less is the network's."""
 
@@ -51,6 +53,8 @@ class StateSync(AgentPart):
         self._insists_until_s = -math.inf
         self._left_by: set[str] = set()
         """Who was lost, and what it leaves open is not known for sure yet."""
+        self._last_words: dict[str, int] = {}
+        """How often others are still asked what those who were lost have said at last."""
         self._echoes: list[Message] = []
         """Heard in the own name, though this life has not said so."""
 
@@ -119,8 +123,24 @@ class StateSync(AgentPart):
             claim = self._replica.claims.get(writer)
             self._tasking.consider_diversion("" if claim is None else claim.task or "")
         self._left_by.clear()
+        self._ask_for_last_words(now_s)
         if self.queries.current:
             self._insist(now_s)
+
+    def _ask_for_last_words(self, now_s: float) -> None:
+        """Ask again what those who were lost have said at last.
+
+        Whoever has heard it tells it only once it has missed them, too, and answers get lost; but
+        in a crowd some have heard it anyway, and nobody asks so that all would answer.
+        """
+        for writer, times in list(self._last_words.items()):
+            claim = self._replica.claims.get(writer)
+            left = claim is not None and claim.phase is ClaimPhase.OUT
+            if left or times <= 0 or self._are_many or writer in self._peers.membership.present:
+                del self._last_words[writer]
+            else:
+                self._last_words[writer] = times - 1
+                self.queries.want(now_s + self._timing.announce_s)
 
     def _insist(self, now_s: float) -> None:
         """Ask again while somebody is there who has not answered: it may know the newest.
@@ -259,6 +279,7 @@ class StateSync(AgentPart):
             self._awake(now_s)
             self.queries.want(now_s)  # others may have heard its last words
             self._left_by.add(writer)
+            self._last_words[writer] = _LAST_WORDS
 
     def _greet(self, writer: str, now_s: float) -> None:
         """Somebody is there anew: tell it the own registers, and hear what it may know."""
