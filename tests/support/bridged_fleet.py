@@ -40,6 +40,7 @@ from sim.world.settings import Planner, WorldListener, WorldSettings
 from sim.world.virtual_world import World
 from swarm.model import Mission, Task, TaskId, Uav, UavId
 from swarm.model.frames import DEFAULT_ORIGIN
+from swarm.model.ids import COORDINATOR
 from swarm.protocol.messages import CommandKind
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import StatusPhase
@@ -253,7 +254,7 @@ class BridgedFleet:
             timing=timing or Timing(status_s=1.0),
             setting=WorldSettings(
                 network or (lambda queue: IdealNetwork(queue, 0.02)),
-                kept=list(self.books),
+                kept=[*self.books, COORDINATOR],
                 vehicle=self._vehicle,
                 agent=agent,
             ),
