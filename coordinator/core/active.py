@@ -51,7 +51,7 @@ from swarm.protocol.membership import Membership
 from swarm.protocol.messages import Message, Snapshot, StartWithout, TaskEdit
 from swarm.protocol.operator_commands import zone_edits
 from swarm.protocol.registers import Replica
-from swarm.protocol.timing import StallDetector, Timing, earliest
+from swarm.protocol.timing import StallDetector, Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import Claim, ClaimPhase, Status, StatusPhase
 
 
@@ -82,6 +82,8 @@ class CoordinatorCore:
         """Why it has left its seat to another coordinator; None as long as it has not."""
         self._timing = timing
         self._membership = Membership(timing)
+        # UAVs of large fleets repeat themselves the more seldom; their silence means as much less.
+        self._membership.stretch(stretch_of(len(mission.uavs)))
         self._linked = True
         self._state_query = StateQuery(timing.ask_gap_s, timing.silence_s)
         self._predecessors = Predecessors(memory, memory_is_young=memory_age_s <= timing.recall_s)
