@@ -23,7 +23,7 @@ from swarm.protocol.events import (
     Tick,
 )
 from swarm.protocol.messages import MissionConfig, MissionPhase, PlanEpoch, Snapshot, TaskEntry
-from swarm.protocol.timing import Timing
+from swarm.protocol.timing import Timing, stretch_of
 from swarm.protocol.uav_messages import StatusPhase
 from tests.support.builders import (
     IDLE,
@@ -374,6 +374,23 @@ def test_it_repeats_the_epoch_with_the_time_of_now_and_the_rest_in_turns() -> No
     repeated = [e.task for e in said(actions, TaskEntry)]
     assert len(set(repeated)) == 20
     assert len(repeated) + len(said(actions, MissionConfig)) == 24
+
+
+@pytest.mark.parametrize("n_uav", [10, 100])
+def test_uavs_of_a_large_fleet_are_given_up_only_after_a_longer_silence(n_uav: int) -> None:
+    timing = Timing()
+    uavs = [uav(f"u{number}") for number in range(n_uav)]
+    silence_s = stretch_of(n_uav) * timing.silence_s
+    coordinator = LoneCoordinator(mission(uavs, [T0]), timing=timing)
+    coordinator.answer_plan(*coordinator.uavs)
+    coordinator.ready(*coordinator.uavs)
+    heard_s = coordinator.now_s
+
+    def lost(until_s: float) -> list[str]:
+        return [note.text for note in notes(coordinator.run_until(until_s)) if note.text == "lost"]
+
+    assert lost(heard_s + silence_s - 1.0) == []
+    assert lost(heard_s + silence_s + 1.0) == ["lost"] * n_uav
 
 
 # -- the end ----------------------------------------------------------------------------
