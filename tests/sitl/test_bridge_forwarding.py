@@ -71,7 +71,7 @@ class GroundStation(asyncio.DatagramProtocol):
         parser = mavlink.MAVLink(None)
         for datagram in self.datagrams:
             message = parser.decode(bytearray(datagram))
-            names[message.get_srcSystem()].add(message.get_type())
+            names[datagram[5]].add(message.get_type())  # of unknown ones the dialect tells no id
         return names
 
     def close(self) -> None:

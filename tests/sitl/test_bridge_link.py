@@ -21,6 +21,7 @@ from agent.core.interface import (
     FlightLimits,
     GoTo,
     Home,
+    MotorsRun,
     NotReady,
     Return,
     ReturnBegun,
@@ -440,6 +441,7 @@ async def test_vehicle_is_flown_through_a_socket_from_preparation_to_landing() -
         await vehicle.close()
         await served.stop()
     others = [r for r in reports if not isinstance(r, Telemetry | NotReady | FlightLimits)]
-    assert others == [VehicleReady(), Arrived(1), Arrived(2), ReturnBegun(), Home()]
+    flown = [VehicleReady(), Arrived(1), Arrived(2), ReturnBegun(), Home()]
+    assert others == [MotorsRun(ours=True), *flown]
     assert any(isinstance(report, FlightLimits) for report in reports)
     assert not served.copter.armed

@@ -13,6 +13,7 @@ from agent.core.interface import (
     Arrived,
     GoTo,
     Home,
+    MotorsRun,
     NotReady,
     Return,
     ReturnBegun,
@@ -99,7 +100,8 @@ def test_signed_mission_is_flown_and_a_station_without_the_key_is_not_heard(
                     await asyncio.sleep(0.02)
             one.bridge.order(Return("done"))
             await until(lambda: Home() in one.reports)
-            assert one.news == [VehicleReady(), Arrived(1), ReturnBegun(), Home()]
+            flown = [VehicleReady(), Arrived(1), ReturnBegun(), Home()]
+            assert one.news == [MotorsRun(ours=True), *flown]
             assert "COMMAND_ACK" not in stranger.heard
             assert "unsigned" not in one.bridge.dropped
 
