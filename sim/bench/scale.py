@@ -307,7 +307,7 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
             airborne_s = clock.now_s() - begun_s if runs else None
             tell(f"{n_uav} UAVs: flying")
             heard, used, at_s = count.heard.copy(), _used_s(run), clock.now_s()
-            await asyncio.sleep(settings.watch_s if runs else 0.0)
+            await asyncio.sleep(settings.watch_s)  # what one does that never takes off is told, too
             watched_s = clock.now_s() - at_s
             said = count.heard - heard
             shares = tuple(
