@@ -2,7 +2,8 @@
 
 Its owner's own modes, and those younger than our tables, have a name only there. PX4 1.17 tells
 all when it is asked for all; ArduCopter 4.8 tells the first alone, so the others are asked for by
-their number, each once. Whoever refuses or stays silent is asked no more.
+their number, each once. One that takes the first question while it boots may forget the answer, so
+that is asked three times; whoever refuses or stays silent is asked no more.
 
 Command: https://mavlink.io/en/messages/common.html (MAV_CMD_REQUEST_MESSAGE)
 """
@@ -23,6 +24,9 @@ _TAG = "names of modes"
 _ALL = 0
 _PATIENCE_S = 1.0
 """For the mode that was asked for, after its acknowledgement."""
+_FIRST_PATIENCE_S = 5.0
+"""For the first of all."""
+_FIRST_TRIES = 3
 
 
 class ModeNameRequests:
@@ -35,6 +39,7 @@ class ModeNameRequests:
     def ask_anew(self) -> None:
         """Ask for all of them again."""
         self._over = False
+        self._tries = 0
         self._asked: set[int] = set()
         self._heard: set[int] = set()
         self._modes = 0
@@ -63,12 +68,16 @@ class ModeNameRequests:
         """The next request, if it is due."""
         if self._over or commands.pending(_TAG) or now_s < self._next_at_s:
             return []
-        missing = [_ALL, *(n for n in range(1, self._modes + 1) if n not in self._heard)]
-        index = next((number for number in missing if number not in self._asked), None)
+        if not self._heard:
+            index = _ALL if self._tries < _FIRST_TRIES else None
+            self._tries += 1
+        else:
+            missing = set(range(1, self._modes + 1)) - self._heard - self._asked
+            index = min(missing, default=None)
         if index is None:
             self._over = True
             return []
         self._asked.add(index)
-        self._next_at_s = now_s + _PATIENCE_S
+        self._next_at_s = now_s + (_PATIENCE_S if self._heard else _FIRST_PATIENCE_S)
         params = (float(AVAILABLE_MODES_ID), float(index), 0.0, 0.0, 0.0, 0.0, 0.0)
         return commands.send(_TAG, CommandLong(_CMD_REQUEST_MESSAGE, params), now_s)

@@ -89,6 +89,23 @@ def test_who_tells_no_modes_is_asked_once_and_known_by_numbers(fake: type[FakeCo
     assert f"switched it to mode {number}" in taken(flight)
 
 
+def test_who_forgets_the_first_answer_is_asked_again() -> None:
+    vehicle = named(FakeCopter)
+    tell, forgotten = vehicle.say, list[object]()
+
+    def say_but_the_first(message: object) -> None:
+        if getattr(message, "mode_index", 0) and not forgotten:
+            forgotten.append(message)
+        else:
+            tell(message)
+
+    vehicle.say = say_but_the_first  # type: ignore[method-assign]
+    flight = BridgeFlight(vehicle).flying()
+    assert [int(m.param2) for m in vehicle.commands(ASK)] == [0, 0, 2, 3, 4, 5, 6]
+    vehicle.set_mode(OWN_MODE[FakeCopter])
+    assert "switched it to Soar" in taken(flight)
+
+
 def test_a_lost_answer_costs_one_name() -> None:
     vehicle = named(FakeCopter)
     tell = vehicle.say
