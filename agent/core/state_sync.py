@@ -32,7 +32,7 @@ from swarm.protocol.timing import Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import ClaimPhase
 
 _LAST_WORDS = 3
-"""How often others are asked again what somebody who was lost has said at last."""
+"""How often others are asked again at least what somebody who was lost has said at last."""
 _WORTH_TELLING_S = 0.1
 """A correction of the mission clock by less is the network's."""
 
@@ -53,8 +53,8 @@ class StateSync(AgentPart):
         self._insists_until_s = -math.inf
         self._left_by: set[str] = set()
         """Who was lost, and what it leaves open is not known for sure yet."""
-        self._last_words: dict[str, int] = {}
-        """How often others are still asked what those who were lost have said at last."""
+        self._last_words: dict[str, float] = {}
+        """Until when others are asked what those who were lost have said at last [s]."""
         self._echoes: list[Message] = []
         """Heard in the own name, though this life has not said so."""
 
@@ -133,13 +133,13 @@ class StateSync(AgentPart):
         Whoever has heard it tells it only once it has missed them, too, and answers get lost; but
         in a crowd some have heard it anyway, and nobody asks so that all would answer.
         """
-        for writer, times in list(self._last_words.items()):
+        for writer, until_s in list(self._last_words.items()):
             claim = self._replica.claims.get(writer)
             left = claim is not None and claim.phase is ClaimPhase.OUT
-            if left or times <= 0 or self._are_many or writer in self._peers.membership.present:
+            back = writer in self._peers.membership.present
+            if left or back or now_s >= until_s or self._are_many:
                 del self._last_words[writer]
             else:
-                self._last_words[writer] = times - 1
                 self.queries.want(now_s + self._timing.announce_s)
 
     def _insist(self, now_s: float) -> None:
@@ -279,7 +279,7 @@ class StateSync(AgentPart):
             self._awake(now_s)
             self.queries.want(now_s)  # others may have heard its last words
             self._left_by.add(writer)
-            self._last_words[writer] = _LAST_WORDS
+            self._last_words[writer] = now_s + _LAST_WORDS * self._timing.announce_s
 
     def _greet(self, writer: str, now_s: float) -> None:
         """Somebody is there anew: tell it the own registers, and hear what it may know."""

@@ -58,9 +58,9 @@ class QuestionTimer:
         self._ask_at_s: float | None = None
 
     def want(self, now_s: float) -> None:
-        """There is a reason to ask; several before the next question are one."""
-        if self._ask_at_s is None:
-            self._ask_at_s = max(now_s, self._free_at_s)
+        """There is a reason to ask then, or before; several before the next question are one."""
+        at_s = max(now_s, self._free_at_s)
+        self._ask_at_s = at_s if self._ask_at_s is None else min(self._ask_at_s, at_s)
 
     def due(self, now_s: float) -> bool:
         """Whether to ask now; True once for each question."""

@@ -175,8 +175,8 @@ class Roughness:
 def roughness(mission: Mission, seed: int, *, planned: bool) -> Roughness:
     """Accelerations, wind with gusts, places up to 1 m off, losses up to 20 %, and faults.
 
-    Without a plan all rests on words that are heard. Then one agent dies or hangs for no longer
-    than the others fly, and somebody is parted from them for no longer than words may stay away.
+    Without a plan all rests on words that are heard. Then one agent dies or hangs for a while, and
+    somebody is parted from the others for no longer than words may stay away.
     """
     rng = np.random.default_rng([seed, 72])
     wind_m_s = tuple(float(each) for each in rng.uniform(-3.0, 3.0, 2))
@@ -226,7 +226,7 @@ def _faults_without_a_plan(mission: Mission, seed: int) -> tuple[Disturbance, ..
     kind = DisturbanceKind(str(rng.choice([DisturbanceKind.CRASH, DisturbanceKind.HANG])))
     memory = RestartMemory.DISK if kind is DisturbanceKind.CRASH else None
     fault = Disturbance(
-        at_s, kind, (str(fails),), lasts_s=float(rng.uniform(1.0, 20.0)), memory=memory
+        at_s, kind, (str(fails),), lasts_s=float(rng.uniform(1.0, 30.0)), memory=memory
     )
     cut = Disturbance(
         parts_s, DisturbanceKind.CUT, (str(parted),), lasts_s=float(rng.uniform(0.5, 2.5))

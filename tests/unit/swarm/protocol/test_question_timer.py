@@ -52,3 +52,11 @@ def test_the_deadline_of_a_new_question_is_never_past() -> None:
     asking.want(50.0)
 
     assert asking.next_deadline_s() == 50.0
+
+
+def test_a_question_for_later_holds_none_up_that_is_due_before() -> None:
+    asking = QuestionTimer(GAP_S)
+    asking.want(50.0)
+    asking.want(10.0)
+    assert asking.next_deadline_s() == 10.0
+    assert asking.due(10.0)
