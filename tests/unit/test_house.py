@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 import statistics
+import subprocess
 import sys
 from collections import defaultdict
 from collections.abc import Iterator
@@ -26,6 +27,12 @@ ROOT = Path(__file__).parents[2]
 PACKAGES = ("swarm", "agent", "coordinator", "sim")
 LONGEST_FUNCTION = 80
 MOST_FILES_OF_A_CLAIM = 20
+
+
+TOP_LEVEL = {
+    *(*PACKAGES, "tests", "deploy"),
+    *("pyproject.toml", "README.md", "Makefile", "CHANGELOG.md", "DECISIONS.md", "LICENSE"),
+}
 
 
 @cache
@@ -77,6 +84,14 @@ def test_a_module_is_one_idea_neither_a_fragment_nor_a_book() -> None:
 
     assert 120 <= statistics.median(lines) <= 300
     assert max(lines) <= 500
+
+
+def test_nothing_lies_about_on_the_top_level() -> None:
+    command = ["git", "-c", f"safe.directory={ROOT}", "ls-files", "--cached"]
+    kept = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
+    top = {name.partition("/")[0] for name in kept.splitlines()}
+
+    assert {name for name in top if not name.startswith(".")} == TOP_LEVEL
 
 
 def test_every_file_that_a_page_names_is_there() -> None:
