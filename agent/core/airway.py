@@ -43,14 +43,12 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, strength
-from swarm.separation.shifted import hovering, left_of_way, length_m, nominal, shifted_path
+from swarm.separation.shifted import hovering, landed, left_of_way, lifted, nominal, shifted_path
 from swarm.separation.slabs import apart
 from swarm.separation.straight_pieces import not_flown
 
 STOP_LEG = 0
 """Of orders that are this module's own; those of the core are numbered from 1."""
-_LONGER_M = 0.5
-"""A way is as it was reckoned, to so much [m]."""
 _ASIDE_PATIENCE = 4.0
 """How long it waits for its way aside, in intervals at which it asks anew."""
 
@@ -131,17 +129,17 @@ class Airway:
                 return replace(event, position_enu_m=nominal_enu_m)
             case VehicleReady():
                 self._aloft = True
+                if (way := self._told_way).grounded:
+                    self._way = lifted(way, self._fleet.hovers_first_enu_m)
             case Arrived(leg=leg) if leg == self._flown_leg:
                 self._arrive(self._told_way)
             case Held():
-                self._moves, self._stops = True, False  # it is somewhere on its way
+                self._moves, self._stops = self._aloft, False  # it is somewhere on its way
             case Landed() | Home():
                 self._aloft = self._moves = self._stops = False
                 self._lifts_enu_m = None
                 heir = self._fleet.heir(air) if isinstance(event, Home) else None
-                self._way = replace(
-                    self._told_way, path_enu_m=(), flies=False, grounded=True, heir=heir
-                )
+                self._way = replace(landed(self._told_way), heir=heir)
             case Refused(order=GoTo(leg=leg)) if leg == self._flown_leg:
                 self._moves = True
             case _:
@@ -157,7 +155,7 @@ class Airway:
         if self._way is None and claim.way is not None:
             self._way, self._granted = claim.way, dict(claim.way.grants)
             self._keeps = claim.way.keeps
-            self._aloft = bool(claim.way.path_enu_m) and (claim.way.flies or not claim.way.grounded)
+            self._aloft = bool(claim.way.path_enu_m) and not claim.way.grounded
             self._moves = bool(claim.way.path_enu_m)
 
     # -- orders ----------------------------------------------------------------------------------
@@ -258,7 +256,10 @@ class Airway:
             return claim
         if self._stands_at is not None and claim.base is None:
             claim = self._fleet.still_standing(claim, *self._stands_at)
-        made_of = self._told_way, self._granted, self._keeps
+        way = self._told_way
+        if claim.phase is ClaimPhase.OUT and way.grounded:
+            way = landed(way)  # it will not take off any more
+        made_of = way, self._granted, self._keeps
         if made_of != self._made_of:  # most words are about something else
             self._made_of = made_of
             self._whole = replace(made_of[0], grants=dict(self._granted), keeps=self._keeps)
@@ -461,7 +462,7 @@ class Airway:
         self._stands_at = self._lifts_enu_m = None
         self._own_height = wish.own_height
         self._way = replace(way, flies=True, grounded=False)
-        if length_m(path) > length_m(wish.corners_enu_m) + _LONGER_M:
+        if wish.is_shorter_than(path):
             self.when_detoured()
         if isinstance(order, GoTo):
             self._flown_leg = order.leg
@@ -480,10 +481,9 @@ class Airway:
     def _told_way(self) -> ClaimedWay:
         if self._way is not None:
             return self._way
-        me = self._mission_view.me
-        flies = self._aloft and me is not None
-        start = (self._mission_view.in_layer(me.position_enu_m),) if flies and me else ()
-        return ClaimedWay(0, start, flies, not flies)
+        # Where it hovers first is its own before it takes off: nobody asks for that.
+        first = self._fleet.hovers_first_enu_m
+        return ClaimedWay(0, first, flies=bool(first), grounded=not self._aloft)
 
     def _number(self) -> int:
         mission_ms = round(1e3 * self._mission_view.mission_s(self._mission_view.now_s))

@@ -42,6 +42,8 @@ _MOST_OF_RESERVE = 0.75
 """Share of it that the wait and a climb on the way may use up together."""
 _TURNS = 2
 """Corners that a way in another layer has more than one in the own layer, at most."""
+_LONGER_M = 0.5
+"""A way is as it was reckoned, to so much [m]."""
 _ASIDE_M = (1.5, 3.0, 6.0, 12.0)
 """How far somebody steps aside, in separations."""
 _DIRECTIONS = 8
@@ -86,6 +88,10 @@ class Wish:
         """Where it ends if that keeps its height [m]."""
         return self.corners_enu_m[-1] if self.own_height else None
 
+    def is_shorter_than(self, path_enu_m: Sequence[Point]) -> bool:
+        """Whether that path leads a longer way than was reckoned with."""
+        return length_m(path_enu_m) > length_m(self.corners_enu_m) + _LONGER_M
+
 
 class FleetAir:
     """The air of the brief in force, in the eyes of the agent of ``uav``."""
@@ -108,6 +114,12 @@ class FleetAir:
             self._brief = brief
             self._air = None if brief is None else air_of_brief(brief)
         return self._air if self._mission_view.me is not None else None
+
+    @property
+    def hovers_first_enu_m(self) -> tuple[Point, ...]:
+        """Where this UAV hovers after its first take-off [m]; none if it is not in the brief."""
+        me = self._mission_view.me
+        return () if me is None else (self._mission_view.in_layer(me.position_enu_m),)
 
     def corners(self, order: GoTo | Return, here_enu_m: Point) -> tuple[Point, ...]:
         """Of the way of ``order`` in the own layer, from there [m]."""

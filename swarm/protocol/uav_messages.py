@@ -201,7 +201,8 @@ class ClaimedWay(Checked):
     flies: Flag = False
     """Whether all who keep that air have granted it; else it waits where the path begins."""
     grounded: Flag = False
-    """Whether it stands on the ground as long as it does not fly."""
+    """Whether it stands on the ground as long as it does not fly; or, with ``flies``, has not taken
+    off yet, but keeps the air above its start."""
     shift_m: Metres = 0.0
     """How much higher its layer is on that path than the brief's."""
     grants: Mapping[Id, Count] = field(default_factory=dict)

@@ -86,6 +86,17 @@ def hovering(way: ClaimedWay) -> ClaimedWay:
     return replace(way, path_enu_m=here, flies=bool(here), grounded=not here, shift_m=shift_m)
 
 
+def landed(way: ClaimedWay) -> ClaimedWay:
+    """Standing on the ground after ``way``, which takes no air."""
+    return replace(way, path_enu_m=(), flies=False, grounded=True)
+
+
+def lifted(way: ClaimedWay, hovers_enu_m: tuple[Point, ...]) -> ClaimedWay:
+    """In the air, somewhere on ``way``; without one where it hovers first [m]."""
+    path = way.path_enu_m or hovers_enu_m
+    return replace(way, path_enu_m=path, flies=bool(path), grounded=False)
+
+
 def left_of_way(
     way: ClaimedWay, place_enu_m: Point, corners_enu_m: Sequence[Point], end_enu_m: Point | None
 ) -> ClaimedWay | None:
