@@ -15,7 +15,7 @@ from coordinator.planner.field_plan import is_field
 from sim.faults.field_missions import random_field_mission
 from sim.faults.field_plans import quick_field_plan
 from sim.faults.injector import FaultInjector
-from sim.faults.invariants import TELEMETRY_GAP_S, InvariantChecker
+from sim.faults.invariants import TELEMETRY_S, InvariantChecker
 from sim.faults.message_log import Violation
 from sim.faults.planted_bugs import BUGS
 from sim.faults.schedule import Disturbance, DisturbanceKind, format_schedule, parse_schedule
@@ -168,7 +168,7 @@ def play(
                     each.names[0] for each in case.schedule if each.kind is DisturbanceKind.CRASH
                 },
                 plan_s=0.05,
-                telemetry_gap_s=TELEMETRY_GAP_S,
+                telemetry_s=TELEMETRY_S,
                 vehicle=vehicles_of(mission),
             ),
             watch=judge,

@@ -68,8 +68,8 @@ _LATE_S = 2.0
 """What is forgiven of windows: clocks jump, and words are late."""
 _NEAR_M = 1e-3
 """What is forgiven of distances."""
-TELEMETRY_GAP_S = 0.2
-"""Agents hear that often where their vehicles are."""
+TELEMETRY_S = 0.2
+"""Agents hear that often where their vehicles are [s]."""
 _IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
 
 
@@ -392,7 +392,7 @@ class InvariantChecker:
             heed = {uav: s for uav, s in known_s.items() if uav not in self._injector.left_alone}
             zones.append(replace(drawn, known_s=heed))
         flaws = self._injector.flaws
-        judge = FieldJudge(self._world, _LATE_S, stale_s=TELEMETRY_GAP_S, flaws=flaws)
+        judge = FieldJudge(self._world, _LATE_S, stale_s=TELEMETRY_S, flaws=flaws)
         for invariant, text in judge.complaints(zones):
             uav = text.partition(" ")[0]
             if not (invariant == "fell" and uav in self._injector.left_alone):

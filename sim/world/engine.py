@@ -126,8 +126,9 @@ class Process:
         clock: the machine's.
         snapshot: answers a question; None for a process that answers none.
         whole: answers one who wants all that is known; by default as ``snapshot``.
-        telemetry: where the vehicle is, if there is one; told to the core before what it hears.
-        telemetry_gap_s: shortest interval at which it is told [s].
+        telemetry: where the vehicle is, if there is one.
+        telemetry_s: interval at which that is told to the core, whatever it hears [s]; None: before
+            what it hears.
     """
 
     def __init__(
@@ -142,7 +143,7 @@ class Process:
         snapshot: Callable[[float], Snapshot] | None = None,
         whole: Callable[[float], Snapshot] | None = None,
         telemetry: Callable[[], Telemetry | None] | None = None,
-        telemetry_gap_s: float = 0.0,
+        telemetry_s: float | None = None,
     ) -> None:
         self.name = name
         self.writer = writer
@@ -161,7 +162,7 @@ class Process:
         self._snapshot = snapshot
         self._whole = whole or snapshot
         self._telemetry = telemetry
-        self._telemetry_gap_s = telemetry_gap_s
+        self._telemetry_s = telemetry_s
         self._told_s = -math.inf
         self._now_s = -math.inf
         self._tick_at_s = math.inf
@@ -170,6 +171,8 @@ class Process:
     def start(self) -> None:
         """Begin."""
         self._act(self.core.start)
+        if self._telemetry_s is not None:
+            self._queue.after(self._telemetry_s, self._stream_telemetry)
 
     def receive(self, fact: CommonEvent) -> None:
         """Something has arrived from the bus."""
@@ -184,8 +187,9 @@ class Process:
             return
         if isinstance(event, LinkChanged):
             self.linked = event.up
-        if self._telemetry is not None and isinstance(event, MessageReceived | SnapshotsReceived):
-            self._tell_telemetry(self._telemetry)
+        heard = isinstance(event, MessageReceived | SnapshotsReceived)
+        if heard and self._telemetry_s is None:
+            self._tell_telemetry()
         self._act(lambda now_s: self.core.step(event, now_s))
 
     def answer(self, *, whole: bool = False) -> Snapshot | None:
@@ -198,6 +202,8 @@ class Process:
     def resume(self) -> None:
         """Go on, with what has arrived meanwhile: first of all a deadline, if one has passed."""
         self.held = False
+        if self._telemetry_s is not None:
+            self._tell_telemetry()
         if self._tick_at_s <= self._queue.now_s():
             self._tick_at_s = math.inf
             self._act(lambda now_s: self.core.step(Tick(), now_s))
@@ -209,13 +215,19 @@ class Process:
         self._now_s = max(self._now_s, self._clock.local_s(self._queue.now_s()))
         return self._now_s
 
-    def _tell_telemetry(self, telemetry: Callable[[], Telemetry | None]) -> None:
+    def _stream_telemetry(self) -> None:
+        if self.over or self._telemetry_s is None:
+            return
+        self._queue.after(self._telemetry_s, self._stream_telemetry)
+        if not self.held:
+            self._tell_telemetry()
+
+    def _tell_telemetry(self) -> None:
         time_s = self._queue.now_s()
-        if time_s > self._told_s and time_s - self._told_s >= self._telemetry_gap_s:
-            told = telemetry()
-            if told is not None:
-                self._told_s = time_s
-                self._act(lambda now_s: self.core.step(told, now_s))
+        told = None if self._telemetry is None or time_s <= self._told_s else self._telemetry()
+        if told is not None:
+            self._told_s = time_s
+            self._act(lambda now_s: self.core.step(told, now_s))
 
     def _act(self, act: Callable[[float], Any]) -> None:
         if self.over:

@@ -131,8 +131,9 @@ class WorldSettings:
     """How long planning takes [s]."""
     start_timeout_s: float = 60.0
     """UAVs that are not airborne by then are given up [s]."""
-    telemetry_gap_s: float = 0.0
-    """Shortest interval at which vehicles tell where they are [s]."""
+    telemetry_s: float | None = None
+    """Interval at which vehicles tell their agents where they are [s]; None: before all that agents
+    hear from others, and not between."""
     without_bus_s: float | None = None
     """Agents without their link for that long go home [s]; None: they fly on."""
     vehicle: VehicleFactory = ideal_vehicle

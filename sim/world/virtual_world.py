@@ -432,7 +432,7 @@ class World:
             snapshot=agent.snapshot,
             whole=agent.whole,
             telemetry=partial(self._telemetry, name),
-            telemetry_gap_s=self._setting.telemetry_gap_s,
+            telemetry_s=self._setting.telemetry_s,
         )
 
     def _coordinator(

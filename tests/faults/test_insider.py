@@ -154,7 +154,7 @@ def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None
         method=flown.method,
         seed=seed,
         timing=TIMING,
-        setting=WorldSettings(network=join, plan_s=0.05, telemetry_gap_s=0.2),
+        setting=WorldSettings(network=join, plan_s=0.05, telemetry_s=0.2),
     )
     before: list[MissionResult] = []
 

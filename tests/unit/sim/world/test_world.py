@@ -10,9 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from agent.core.agent_core import AgentCore
+from agent.core.interface import Action, Event, Telemetry
 from coordinator.planner.options import after_evaluations
 from coordinator.planner.plan import make_plan
-from sim.world.settings import QUIET, ScheduledLosses
+from sim.world.network import IdealNetwork
+from sim.world.settings import QUIET, ScheduledLosses, WorldSettings
 from sim.world.virtual_world import World
 from swarm.model import Mission, Plan, UavId
 from swarm.model.ids import COORDINATOR
@@ -146,6 +149,27 @@ def test_repeating_everything_changes_nothing() -> None:
     assert busy.run(1e4)
 
     assert quiet.mission_state.result() == busy.mission_state.result()
+
+
+def test_an_agent_hears_its_vehicle_while_nobody_says_anything() -> None:
+    """It hovers for 20 s over a task of the only UAV, and no word comes from anybody."""
+    heard_s: list[float] = []
+
+    class Listening(AgentCore):
+        def step(self, event: Event, now_s: float) -> list[Action]:
+            if isinstance(event, Telemetry):
+                heard_s.append(now_s)
+            return super().step(event, now_s)
+
+    flown = mission([uav("u0")], [task("t0", 10.0, service_s=20.0)])
+    setting = WorldSettings(
+        lambda queue: IdealNetwork(queue, 0.0), telemetry_s=0.2, agent=Listening
+    )
+    world = World(flown, planner, method="greedy", seed=0, setting=setting)
+    assert world.run(1e4)
+
+    assert heard_s[-1] - heard_s[0] > 20.0
+    assert max(np.diff(heard_s)) < 0.2 + 1e-6
 
 
 @pytest.mark.parametrize("faults", [{"lost_at_s": {"u0": -1.0}}, {"coordinator_lost_at_s": -1.0}])
