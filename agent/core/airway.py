@@ -193,7 +193,8 @@ class Airway:
         corners = self._fleet.corners(order, here)
         # Home, a vehicle goes down to its own layer above its start by itself.
         own_height |= isinstance(order, Return) and not order.land
-        now_s, high = self._mission_view.now_s, self._at_own_height
+        now_s = self._mission_view.now_s
+        high = self._own_height if self._moves else self._at_own_height
         self._wish = Wish(order, now_s, corners, own_height, fixed, high, takes_s=takes_s)
         self._aside = None
         if not self._aloft:

@@ -1,7 +1,9 @@
 """How a UAV of a mission in the field flies a path: as plans have it, corner by corner.
 
 Plans know places by the heights that the mission gives, so the height of a UAV's layer is no part
-of a way; here it is added and taken off evenly along one. Leaves out: which paths are flown.
+of a way; here it is added and taken off evenly along one. Where UAVs are kept apart they also fly
+in other layers, which they climb to upright: such ways are as long as they are. Leaves out: which
+paths are flown.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ FloatArray = npt.NDArray[np.float64]
 
 _CHAIN_FRAC = 1e-5
 """Chains of chords in the place of round corners are longer than these by less than that share."""
+_SAME_M = 1e-3
+"""Heights or places that differ by less are the same."""
 
 
 class FieldPaths:
@@ -61,7 +65,10 @@ class FieldPaths:
         row = self._rows[name]
         model = self._models[row]
         flown = np.array(corners_enu_m, dtype=np.float64)
-        planned = _without_layers(flown, *layers_m)
+        first_m, last_m = layers_m
+        if self.mission.separation_m is not None and _is_level_or_upright(flown):
+            last_m = first_m  # it climbs to a layer of its choice: all of that is part of the way
+        planned = _without_layers(flown, first_m, last_m)
         offset_m = np.diff(planned, axis=0).T
         piece_m = straight_m(offset_m)
         length_m = float(piece_m.sum())
@@ -100,6 +107,13 @@ class FieldPaths:
     def _nodes(self) -> dict[Point, int]:
         places = list(map(_known_as, self._network.node_enu_m))
         return {place: node for node, place in reversed(list(enumerate(places)))}
+
+
+def _is_level_or_upright(flown_enu_m: FloatArray) -> bool:
+    """Whether each piece of a path keeps its height, or its place seen from above."""
+    flat_m = np.hypot(*np.diff(flown_enu_m[:, :2], axis=0).T)
+    up_m = np.abs(np.diff(flown_enu_m[:, 2]))
+    return bool(np.all(np.minimum(flat_m, up_m) < _SAME_M))
 
 
 def _without_layers(flown_enu_m: FloatArray, first_m: float, last_m: float) -> FloatArray:

@@ -24,6 +24,8 @@ BROKEN_ONCE = {
     3010048: "a way round a zone had more corners than a claim can tell, and was never asked for",
     3010070: "two went home, and the one in the way of the other waited for it",
     3010092: "an heir sat beside whom it followed, and was lost: two of three seats were",
+    3100409: "a vehicle told an agent that heard nobody nothing of its battery, and fell",
+    3100594: "who left a task for another layer still went by its own, and fell on the way",
     3100739: "who was held before it took off had let others have the air above its start",
     3010313: "a line under a new zone was flown by one whose battery has no end",
 }

@@ -126,6 +126,14 @@ def test_between_its_layer_and_the_height_of_a_task_it_stops_in_no_time() -> Non
     assert flight.told(Arrived(2)) == pytest.approx(4.0)
 
 
+def test_a_layer_that_is_climbed_to_upright_takes_as_long_as_the_way_is() -> None:
+    """From a task's height down to a layer below the own one, and along it."""
+    apart = FieldPaths(replace(MISSION, separation_m=5.0, band_m=(20.0, 60.0)))
+    corners = [(0.0, 0.0, 24.0), (0.0, 0.0, 20.0), (8.0, 0.0, 20.0)]
+    assert apart.path("u0", corners, (0.0, 50.0)).duration_s == pytest.approx(1.2)
+    assert apart.path("u0", corners[1:], (30.0, 50.0)).duration_s == pytest.approx(0.8)
+
+
 def test_who_lands_from_another_layer_takes_off_into_its_own() -> None:
     flight = Flight()
     flight.order(Return("no slot", via_enu_m=(50.0, 0.0, 30.0), land=True))
