@@ -312,6 +312,7 @@ class CoordinatorCore:
         if memory is not None:
             self._announcer.observe(coordinator_messages(memory.messages))
         self._predecessors.succeeded()
+        self._join(inherited)
         self._adopt(inherited, now_s)
         self._actions += self._mission.brief(now_s)
 
@@ -319,14 +320,12 @@ class CoordinatorCore:
         """Add what has become known to the mission in charge of."""
         overheard, runs = self._predecessors.overheard, self._announcer.zero_s is not None
         found = reunion(snapshots, overheard, self._bid, runs=runs)
+        self._join(found.inherited)
         if found.is_open:
-            self._join(found.inherited)
             self._state_query.want(now_s, before_deciding=True)
             return
-        if found.is_followed:
+        if found.is_followed or self._comes_too_late(found.inherited):
             self._adopt(found.inherited, now_s)
-        else:
-            self._join(found.inherited)
         if self._announcer.observe([*found.theirs, *overheard]):
             self._actions += self._announcer.restate()
         self._predecessors.succeeded()
@@ -335,13 +334,20 @@ class CoordinatorCore:
         if any(snapshot.writer == COORDINATOR for snapshot in snapshots):
             self._announcer.hurry(now_s)
 
+    def _comes_too_late(self, inherited: InheritedState) -> bool:
+        """Whether it has begun a flight for a fleet that comes home from one that has ended.
+
+        What UAVs have done in that one would forestall the other for ever.
+        """
+        begins = self.stage is MissionStage.BRIEFED
+        return begins and inherited.has_ended and self._mission.gate.is_for_nobody
+
     def _join(self, inherited: InheritedState) -> None:
         """Take in what all but coordinators have said: this one speaks for itself."""
         self.replica.join_all(m for m in inherited.replica.messages() if m.writer != COORDINATOR)
 
     def _adopt(self, inherited: InheritedState, now_s: float) -> None:
-        """Make all that is known of the mission one's own, and say it in one's own name."""
-        self._join(inherited)
+        """Make what coordinators have said one's own, and say it in one's own name."""
         if COORDINATOR not in inherited.replica.writers():
             return
         epoch = inherited.replica.epoch

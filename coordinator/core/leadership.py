@@ -135,6 +135,12 @@ class InheritedState:
         epoch = self.replica.epoch
         return epoch is not None and epoch.phase is MissionPhase.RUNNING
 
+    @property
+    def has_ended(self) -> bool:
+        """Whether the mission has ended."""
+        epoch = self.replica.epoch
+        return epoch is not None and epoch.phase is MissionPhase.ENDED
+
 
 def inherited_state(
     snapshots: Sequence[Snapshot],

@@ -174,6 +174,14 @@ class StartGate:
         at_work = any(claim.is_taken for claim in self._replica.claims.values())
         return at_work or bool(self._replica.outcomes)
 
+    @property
+    def is_for_nobody(self) -> bool:
+        """Whether the fleet has been at work, and whoever is there has left that flight."""
+        claims, present = self._replica.claims, self._membership.present
+        there = [claims.get(uav) for uav in self._fleet if uav in present]
+        left = all(claim is not None and claim.phase is ClaimPhase.OUT for claim in there)
+        return left and self.is_forestalled
+
     def advance(self, now_s: float) -> tuple[StartDecision, list[CoordinatorAction]]:
         """Whether to start by now, and what is to do before."""
         self._wake_at_s = None

@@ -18,7 +18,7 @@ from swarm.protocol.events import (
     Tick,
 )
 from swarm.protocol.messages import MissionConfig, MissionPhase, PlanEpoch
-from tests.support.builders import IDLE, done, epoch, held, message, mission
+from tests.support.builders import IDLE, OUT, done, epoch, held, message, mission
 from tests.support.earlier_life import (
     EXTRA,
     FLOWN,
@@ -87,6 +87,37 @@ def test_an_ended_mission_of_before_does_not_end_the_one_that_begins() -> None:
     restated = [a.message for a in coordinator.log if isinstance(a, Publish)][-3:]
     assert min(m.stamp.incarnation for m in restated) > OLD_LIFE
     assert all(m.body.run != RUN for m in restated if isinstance(m.body, MissionConfig))
+
+
+def test_a_mission_that_has_just_ended_is_not_begun_anew_for_those_who_come_home() -> None:
+    """It was begun anew within a moment, before any transport was up."""
+    coordinator = LoneCoordinator(FLOWN, incarnation=600)
+    over = epoch("u0", "u1", phase=MissionPhase.ENDED, number=4, mission_s=50.0)
+    words = [*registers(over), message("u0", OUT, 9), message("u0", done("t0"), 8)]
+    coordinator.answers = [replace(answer((), 51.0), messages=tuple(words))]
+    coordinator.see("u0")
+
+    assert coordinator.phase is MissionPhase.ENDED
+    assert said(coordinator.log, MissionConfig)[-1].run == RUN
+    coordinator.answers = ()
+    coordinator.leave("u0")
+    coordinator.run_until(coordinator.now_s + 2.0 * TIMING.linger_s)
+    assert finishes(coordinator.log) == [1]  # t1 was left undone
+
+
+def test_a_mission_that_has_ended_for_some_is_asked_about_while_others_are_at_work() -> None:
+    coordinator = LoneCoordinator(FLOWN, incarnation=600)
+    over = epoch("u0", "u1", phase=MissionPhase.ENDED, number=4, mission_s=50.0)
+    words = [*registers(over), message("u0", OUT, 9), message("u0", done("t0"), 8)]
+    coordinator.hear("u1", held("t1", 3.0))
+    coordinator.happen(PeerSeen("u1"))
+    coordinator.answers = [replace(answer((), 51.0), messages=tuple(words))]
+    coordinator.see("u0")
+    assert coordinator.phase is None
+
+    coordinator.hear("u1", OUT, coordinator.now_s + 1.0)
+    coordinator.run_until(coordinator.now_s + 2.0 * TIMING.ask_gap_s)
+    assert coordinator.phase is MissionPhase.ENDED
 
 
 # -- held up, cut off ---------------------------------------------------------------------
