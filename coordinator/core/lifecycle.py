@@ -355,7 +355,8 @@ class MissionEndCondition:
         self._timing = timing
         self._grace_until_s = 0.0
         self._ignorant_until_s = 0.0
-        self._prospect: str | None = None
+        self._prospect: tuple[str | None, float] = None, 0.0
+        """How it will end if nothing changes, and how long that is waited for [s]."""
         self._over_at_s: float | None = None
 
     def wait_until(self, grace_until_s: float, *, was_away: bool = False) -> None:
@@ -377,14 +378,15 @@ class MissionEndCondition:
             mission_s: mission time [s]; in the field what can be done depends on it.
             more_to_come: whether tasks have yet to appear.
         """
-        prospect, patience_s = self._outlook(mission_s, more_to_come=more_to_come)
+        before, self._prospect = self._prospect, self._outlook(mission_s, more_to_come=more_to_come)
+        prospect, patience_s = self._prospect
         if prospect is None:
-            self._prospect = self._over_at_s = None
+            self._over_at_s = None
             return None
         grace_s = self._ignorant_until_s if prospect == ALL_ENDED else self._grace_until_s
         at_s = max(now_s + patience_s, grace_s)
-        if prospect != self._prospect or self._over_at_s is None:
-            self._prospect, self._over_at_s = prospect, at_s
+        if self._prospect != before or self._over_at_s is None:
+            self._over_at_s = at_s
         self._over_at_s = min(self._over_at_s, at_s)
         return prospect if self._over_at_s <= now_s else None
 
@@ -431,5 +433,17 @@ class MissionEndCondition:
         if TaskState.OPEN not in self._board.states.values() and not more_to_come:
             return ALL_ENDED, 0.0
         # Who was lost and never said that it is out may have been cut off, and come back.
-        may_return = self._can_go_on(taking_part, mission_s) or (more_to_come and taking_part)
+        silent = self._without_a_claim(fleet)
+        may_return = self._can_go_on(taking_part, mission_s) or anything_doable(self._board, silent)
+        may_return |= more_to_come and bool(taking_part | silent)
         return NOBODY_LEFT, self._timing.abandon_s if may_return else 0.0
+
+    def _without_a_claim(self, fleet: Iterable[UavId]) -> set[UavId]:
+        """Who gets ready, or was lost while it did, and may yet take part.
+
+        Not who was never there, nor whom the operator does not wait for.
+        """
+        claims, members = self._board.replica.claims, self._membership
+        given_up = dispensable(self._board.replica)
+        silent = {uav for uav in fleet if uav not in claims and uav not in given_up}
+        return {uav for uav in silent if uav in members.present or members.missed(uav)}

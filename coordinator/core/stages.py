@@ -8,6 +8,7 @@ could do or the operator aborts it, and leaves when everybody has left.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from enum import Enum
@@ -110,6 +111,8 @@ class StagedMission:
         self._timing = timing
         self._leave_at_s: float | None = None
         """When it leaves a mission that has ended, unless agents are there then."""
+        self._forgets_at_s = math.inf
+        """Until when it stays for agents that are there and have never claimed anything."""
 
     @property
     def asks_for(self) -> tuple[str, ...]:
@@ -249,6 +252,7 @@ class StagedMission:
             return []
         self.end_condition.settle()
         self._leave_at_s = now_s + self._timing.linger_s
+        self._forgets_at_s = now_s + self._timing.abandon_s
         return self.replan_policy.stop()
 
     def _say_epoch(self, epoch: PlanEpoch) -> list[CoordinatorAction]:
@@ -275,10 +279,15 @@ class StagedMission:
         return actions
 
     def _leave_when_empty(self, now_s: float) -> list[CoordinatorAction]:
-        """Stay until all agents have left, so that each has heard of the end."""
+        """Stay until all agents have left, so that each has heard of the end.
+
+        One that has never said what it claims is not missed when it hangs.
+        """
         if self._leave_at_s is None or now_s < self._leave_at_s:
             return []
-        if self._membership.present:
+        present, claims = self._membership.present, self._replica.claims
+        awaited = present if now_s < self._forgets_at_s else present & claims.keys()
+        if awaited:
             self._leave_at_s = now_s + self._timing.linger_s
             return []
         actions = self._enter(MissionStage.DONE, now_s)

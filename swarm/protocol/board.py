@@ -81,7 +81,7 @@ class TaskState(StrEnum):
 
 
 def anything_doable(board: TaskBoard, present: Collection[str]) -> bool:
-    """Whether some UAV taking part in the mission is capable of some open task.
+    """Whether some UAV that is or may yet take part in the mission is capable of some open task.
 
     ``present`` are the writers believed alive; the lost take no part.
     """
@@ -91,7 +91,7 @@ def anything_doable(board: TaskBoard, present: Collection[str]) -> bool:
     able = [
         index
         for index, uav in enumerate(problem.uav_ids)
-        if uav in present and uav in claims and claims[uav].phase is not ClaimPhase.OUT
+        if uav in present and (uav not in claims or claims[uav].phase is not ClaimPhase.OUT)
     ]
     all_open, capable = board.open, problem.capable
     open_ = (column for column, task in enumerate(problem.task_ids) if task in all_open)

@@ -58,6 +58,10 @@ class Membership:
         """
         return self.present - self._interrupted
 
+    def missed(self, writer: str) -> bool:
+        """Whether ``writer`` was lost, and has not said since what it claims."""
+        return writer in self._ghosts
+
     def mute(self, writer: str) -> bool:
         """Whether ``writer`` was lost by its silence, with a living token."""
         return writer in self._mute

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from coordinator.core.lifecycle import PlanFailed, PlanMade, Withdraw
-from swarm.model.ids import COORDINATOR
+from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.model.layers import FlightLayers
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
@@ -22,7 +22,14 @@ from swarm.protocol.events import (
     Stop,
     Tick,
 )
-from swarm.protocol.messages import MissionConfig, MissionPhase, PlanEpoch, Snapshot, TaskEntry
+from swarm.protocol.messages import (
+    MissionConfig,
+    MissionPhase,
+    PlanEpoch,
+    Snapshot,
+    StartWithout,
+    TaskEntry,
+)
 from swarm.protocol.timing import Timing, stretch_of
 from swarm.protocol.uav_messages import StatusPhase
 from tests.support.builders import (
@@ -283,6 +290,38 @@ def test_it_goes_on_with_those_who_were_only_cut_off() -> None:
     assert coordinator.phase is MissionPhase.RUNNING
 
 
+@pytest.mark.parametrize("is_lost", [True, False], ids=["lost", "climbing"])
+def test_who_was_there_before_the_start_and_is_not_airborne_may_yet_do_what_is_left(
+    is_lost: bool,
+) -> None:
+    coordinator = LoneCoordinator(mission([U0, uav("u1", t0=0.0)], [T0, T1]))
+    coordinator.see("u0")
+    if is_lost:
+        coordinator.lose("u0", 105.0)
+    coordinator.ready("u1")
+    coordinator.run_until(100.0 + START_TIMEOUT_S)
+    coordinator.answer_plan("u1")
+    coordinator.hear("u1", done("t1"))
+    ends_s = coordinator.now_s + TIMING.abandon_s
+    coordinator.run_until(ends_s - 1.0)
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    coordinator.run_until(ends_s + 1.0)
+    assert coordinator.reason == "nobody is left who could go on"
+
+
+def test_nobody_waits_for_who_was_never_there_nor_for_whom_the_operator_does_without() -> None:
+    coordinator = LoneCoordinator(mission([U0, uav("u1", t0=0.0), U2], [T0, T1]))
+    coordinator.see("u0")
+    coordinator.hear(OPERATOR, StartWithout("u0", 1, "no battery"))
+    coordinator.ready("u1")
+    coordinator.run_until(100.0 + START_TIMEOUT_S)
+    coordinator.answer_plan("u1")
+    coordinator.hear("u1", done("t1"))
+
+    assert coordinator.reason == "nobody is left who could go on"
+
+
 def test_the_wait_for_the_lost_begins_anew_after_each_return() -> None:
     coordinator = LoneCoordinator(mission([U0], [T0])).started()
     coordinator.hear("u0", held("t0", 0.0))
@@ -426,6 +465,23 @@ def test_it_stays_until_all_have_left_and_then_ends_well_if_all_was_done() -> No
     coordinator.run_until(600.0)
     assert finishes(coordinator.log) == [0]
     assert coordinator.core.next_deadline_s() is None
+
+
+def test_it_stays_for_one_that_hangs_before_its_first_claim_no_longer_than_for_the_lost() -> None:
+    """Nothing that it says so early comes here, so its silence says nothing."""
+    coordinator = LoneCoordinator(mission([U0, U1], [T0]))
+    coordinator.see("u1")
+    coordinator.ready("u0")
+    coordinator.run_until(100.0 + START_TIMEOUT_S)
+    coordinator.answer_plan("u0")
+    coordinator.hear("u0", done("t0"))
+    assert coordinator.reason == "every task has ended"
+    ended_s = coordinator.now_s
+    coordinator.leave("u0")
+
+    assert finishes(coordinator.run_until(ended_s + 0.9 * TIMING.abandon_s)) == []
+    later_s = ended_s + TIMING.abandon_s + TIMING.linger_s
+    assert finishes(coordinator.run_until(later_s)) == [0]
 
 
 def test_it_ends_badly_if_something_was_left_undone() -> None:

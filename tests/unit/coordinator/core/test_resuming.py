@@ -159,17 +159,18 @@ def test_nobody_is_missed_before_they_had_the_time_to_show_themselves() -> None:
     assert coordinator.reason == "nobody is left who could go on"
 
 
-def test_who_is_seen_but_was_never_heard_has_the_time_to_say_what_it_is_about() -> None:
+def test_who_is_seen_but_was_never_heard_has_the_time_to_get_ready() -> None:
     out = replace(
         answer(registers(running()), 5.0), messages=(*registers(running()), message("u0", OUT))
     )
     coordinator = LoneCoordinator(FLOWN, answers=[out], incarnation=600)
     coordinator.run_until(100.0 + 0.5 * TIMING.relink_grace_s)
     coordinator.see("u1")
-    coordinator.run_until(100.0 + 1.4 * TIMING.relink_grace_s)
+    seen_s = coordinator.now_s
+    coordinator.run_until(100.0 + 0.9 * TIMING.abandon_s)
     assert coordinator.phase is MissionPhase.RUNNING
 
-    coordinator.run_until(100.0 + 1.6 * TIMING.relink_grace_s)
+    coordinator.run_until(seen_s + 1.1 * TIMING.abandon_s)
     assert coordinator.reason == "nobody is left who could go on"
 
 

@@ -285,7 +285,7 @@ def test_equal_registers_give_equal_boards_whatever_order_they_came_in(seed: int
             np.testing.assert_array_equal(other.problem.success, first.problem.success)
 
 
-def test_doable_is_what_someone_who_takes_part_is_capable_of() -> None:
+def test_doable_is_what_someone_who_takes_part_or_may_yet_is_capable_of() -> None:
     fleet = uav("u0", t1=0.0), uav("u1", t0=0.0), uav("u2")
     registers = Registers((COORDINATOR, brief(*fleet)))
     registers.post(entry("t0"), entry("t1", number=1), entry("t2", number=2))
@@ -297,7 +297,7 @@ def test_doable_is_what_someone_who_takes_part_is_capable_of() -> None:
 
     assert found("u0", "u1", "u2")
     assert found("u0")
-    assert not found("u2")  # it has said nothing yet
+    assert found("u2")  # it has said nothing yet
     assert not found()
     registers.say("u2", OUT)
     assert not found("u2")

@@ -120,6 +120,18 @@ def test_who_was_lost_and_is_back_is_news_but_not_credible_before_it_speaks(
     assert members.credible == {"u1"}
 
 
+def test_who_was_lost_is_missed_until_it_has_said_what_it_claims(members: Membership) -> None:
+    assert not members.missed("u1")
+    members.gone("u1", 0.0)
+    members.lost(DELAY_S)
+    assert members.missed("u1")
+    members.seen("u1", 5.0)
+    assert members.missed("u1")
+    members.spoke("u1")
+    assert not members.missed("u1")
+    assert not members.missed("u9")
+
+
 def test_who_only_blinked_stays_credible(members: Membership) -> None:
     members.gone("u1", 0.0)
 
