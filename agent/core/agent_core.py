@@ -16,6 +16,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from agent.core.announcer import Announcer
+from agent.core.attention import Attention
 from agent.core.context import AgentContext, AgentPart, usual_field_rule
 from agent.core.field_tasking import FieldTasking
 from agent.core.ground_station import HELD_BEFORE, GroundStation, was_held
@@ -136,9 +137,9 @@ class AgentCore(AgentPart):
         self._near_traffic.when_disturbed = self._tasking.disturbed
         self._ending = EndCondition(context)
         self._commander = VehicleCommander(context, self._tasking, self._ending)
-        parts = context, self._tasking, self._commander
-        self._station = GroundStation(*parts, shown=shows_stations)
+        self._station = GroundStation(context, self._tasking, self._commander, shown=shows_stations)
         self._sync = StateSync(context, self._tasking)
+        self._attention = Attention(context, self._sync, shows_stations=shows_stations)
         self._queries = self._sync.queries
         self._recovered = RecoveredState(uav, memory, memory_age_s, timing)
         self._saving = SaveCondition(uav, self.replica, timing)
@@ -173,7 +174,7 @@ class AgentCore(AgentPart):
                 return []
         if isinstance(event, MessageReceived | MessagesReceived):
             event = self._sync.without_repeated(event, now_s)
-            if not event.messages and self._is_idle(now_s):
+            if self._is_idle(now_s) and self._attention.only_remembers(event, now_s):
                 return []
         if not self._machine.has_ended:
             if self._stall_detector.late(now_s):

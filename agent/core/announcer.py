@@ -171,6 +171,12 @@ class Announcer:
             said.append(self.say(status()))
         return said
 
+    def has_news(self, now_s: float) -> bool:
+        """Whether `repeat` would say news, or when it will, though nothing else is due."""
+        if self._repeats_news or not self._news or self._announce_at_s is None:
+            return self._repeats_news
+        return self._announce_at_s > now_s + self._timing.announce_s
+
     def next_deadline_s(self) -> float | None:
         """When `repeat` will next have something to say."""
         return earliest(self._announce_at_s, self._status_at_s)

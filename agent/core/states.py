@@ -203,6 +203,8 @@ TAKES_TARGETS: Final = frozenset(
     }
 )
 """The vehicle is under command and goes where it is sent, at a base from the ground up."""
+BUSY: Final = frozenset({_S.FLYING, _S.SERVING})
+"""It does a task that it claims, in the air."""
 AT_BASE: Final = frozenset({_S.BESIDE_SLOTS, _S.SWAPPING, _S.READY_ON_GROUND, _S.DEPARTING})
 """The vehicle is on the ground, or about to touch down."""
 VISITS_BASE: Final = frozenset({_S.FLYING_TO_BASE, _S.ABOVE_BASE, _S.BESIDE_SLOTS, _S.SWAPPING})

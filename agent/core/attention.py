@@ -1,0 +1,63 @@
+"""What of the words of others one agent has to look up for.
+
+In a large fleet nearly all that is said concerns others: they take tasks, hold them and end them,
+while this UAV is busy with its own. It remembers what they say, and nothing else follows.
+"""
+
+from __future__ import annotations
+
+from agent.core.context import AgentContext, AgentPart
+from agent.core.state_sync import StateSync
+from agent.core.states import BUSY
+from swarm.protocol.events import MessagesReceived
+from swarm.protocol.messages import Message
+from swarm.protocol.uav_messages import Claim, Outcome
+
+
+class Attention(AgentPart):
+    """Tells what an agent only remembers from what it has to think about.
+
+    Args:
+        context: of the agent.
+        sync: takes in what is heard.
+        shows_stations: whether ground stations are shown what the fleet has done.
+    """
+
+    def __init__(self, context: AgentContext, sync: StateSync, *, shows_stations: bool) -> None:
+        super().__init__(context)
+        self._sync = sync
+        self._shows_stations = shows_stations
+
+    def only_remembers(self, event: MessagesReceived, now_s: float) -> bool:
+        """Whether nothing follows from ``event``; then it has been taken in.
+
+        To be asked while nothing is due by itself.
+        """
+        messages = event.messages
+        if messages:
+            task = self._busy_with()
+            if task is None or self._announcer.has_news(now_s):
+                return False
+            for message in messages:
+                if not self._is_about_another(message, task):
+                    return False
+            for message in messages:
+                self._sync.hear(message, now_s)
+        return True
+
+    def _busy_with(self) -> str | None:
+        """The task that this UAV flies to or works at; None where more is to be thought of.
+
+        Where the air is shared, those are the ways of others.
+        """
+        brief, claim = self._replica.brief, self._replica.claims.get(self._uav)
+        if claim is None or self._machine.state not in BUSY or self._shows_stations:
+            return None
+        return claim.task if brief is not None and brief.separation_m is None else None
+
+    def _is_about_another(self, message: Message, task: str) -> bool:
+        """Whether a UAV that is there says what it does about another task."""
+        body = message.body
+        if not isinstance(body, Claim | Outcome) or body.task == task:
+            return False
+        return self._peers.membership.is_credible(message.writer)
