@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
@@ -18,6 +17,10 @@ FloatArray = npt.NDArray[np.float64]
 
 _AT_ONCE = 100_000
 """Pieces of two vehicles that are looked at together."""
+_WINDOWS = 64
+"""Of time, in each of which a box holds all places of a vehicle."""
+_ROUNDED_M = 1e-6
+"""What is left to rounding before two are taken to be farther apart than others [m]."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,6 +42,7 @@ def closest_approach(
 
     While both accelerate evenly the square of their distance is a polynomial of degree four, so its
     least value is at an end or at a root of a cubic one. Of equals the first pair and instant.
+    Pairs whose boxes are farther apart at all times than others have come are not looked at.
 
     Args:
         tracks: by UAV.
@@ -46,15 +50,72 @@ def closest_approach(
         until_s: what comes later, alike [s].
     """
     flown = {uav: track.pieces(since_s, until_s) for uav, track in tracks.items()}
+    uavs = [uav for uav, pieces in flown.items() if pieces]
+    boxes_m = _boxes_m([flown[uav] for uav in uavs])
     nearest: TrueApproach | None = None
-    for one, other in itertools.combinations(flown, 2):
-        common = list(_common(flown[one], flown[other]))
-        for first in range(0, len(common), _AT_ONCE):
-            distance_m, at_s, number = _nearest(common[first : first + _AT_ONCE])
-            if nearest is None or distance_m < nearest.distance_m:
-                mine, its, _, _ = common[first + number]
-                places_m = mine.position_enu_m(at_s), its.position_enu_m(at_s)
-                nearest = TrueApproach(distance_m, at_s, (one, other), places_m)
+    for row, one in enumerate(uavs):
+        apart_m = _apart_m(boxes_m, row)
+        for other, least_m in zip(uavs[row + 1 :], apart_m, strict=True):
+            if nearest is None or least_m < nearest.distance_m:
+                nearest = _nearer(nearest, (one, other), (flown[one], flown[other]))
+    return nearest
+
+
+def _boxes_m(flown: Sequence[Sequence[MotionPiece]]) -> FloatArray:
+    """(2, n, k, 3) the least and the greatest coordinates of n vehicles in k windows of time [m].
+
+    The last window has no end, as whoever flies then rests. Infinite where one is not there.
+    """
+    boxes_m = np.full((2, len(flown), _WINDOWS, 3), math.inf)
+    boxes_m[1] = -math.inf
+    times_s = [time_s for pieces in flown for piece in pieces for time_s in _times_s(piece)]
+    if not times_s:
+        return boxes_m
+    edges_s = np.linspace(min(times_s), max(times_s), _WINDOWS + 1)
+    for row, pieces in enumerate(flown):
+        begin_s = np.array([[piece.begin_s] for piece in pieces])
+        end_s = np.array([[min(piece.end_s, edges_s[-1])] for piece in pieces])
+        first_s = np.maximum(begin_s, edges_s[:-1])
+        last_s = np.minimum(end_s, edges_s[1:])
+        place, velocity, acceleration = _motion(pieces, begin_s[:, 0])[:, :, None]
+        first, last = (first_s - begin_s)[:, :, None], (last_s - begin_s)[:, :, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turns = np.nan_to_num(-velocity / acceleration, posinf=0.0, neginf=0.0)
+        turns = np.clip(turns, first, np.maximum(first, last))
+        at_s = np.stack(np.broadcast_arrays(first, last, turns))
+        at_m = place + at_s * (velocity + 0.5 * at_s * acceleration)
+        is_there = (first_s <= last_s)[:, :, None]
+        boxes_m[0, row] = np.where(is_there, at_m.min(axis=0), math.inf).min(axis=0)
+        boxes_m[1, row] = np.where(is_there, at_m.max(axis=0), -math.inf).max(axis=0)
+    return boxes_m
+
+
+def _times_s(piece: MotionPiece) -> Iterable[float]:
+    return (time_s for time_s in (piece.begin_s, piece.end_s) if time_s < math.inf)
+
+
+def _apart_m(boxes_m: FloatArray, row: int) -> list[float]:
+    """Of all vehicles after that one, how far from it each is at all times at least [m]."""
+    low_m, high_m = boxes_m[:, row + 1 :]
+    gap_m = np.maximum(low_m - boxes_m[1, row], boxes_m[0, row] - high_m)
+    least2 = (np.maximum(gap_m, 0.0) ** 2).sum(axis=2).min(axis=1)
+    apart_m: list[float] = (np.sqrt(least2) - _ROUNDED_M).tolist()
+    return apart_m
+
+
+def _nearer(
+    nearest: TrueApproach | None,
+    uavs: tuple[str, str],
+    flown: tuple[Sequence[MotionPiece], Sequence[MotionPiece]],
+) -> TrueApproach | None:
+    """The nearest that these two have come, if nobody has come nearer before."""
+    common = list(_common(*flown))
+    for first in range(0, len(common), _AT_ONCE):
+        distance_m, at_s, number = _nearest(common[first : first + _AT_ONCE])
+        if nearest is None or distance_m < nearest.distance_m:
+            mine, its, _, _ = common[first + number]
+            places_m = mine.position_enu_m(at_s), its.position_enu_m(at_s)
+            nearest = TrueApproach(distance_m, at_s, uavs, places_m)
     return nearest
 
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
 import pytest
 
-from sim.world.closest_approach import closest_approach
+from sim.world.closest_approach import _apart_m, _boxes_m, closest_approach
 from sim.world.flown_path import FlownPath, MotionPiece
 from sim.world.motion import Point, ramps_over
 from sim.world.track import Track, drifting
@@ -83,3 +84,30 @@ def test_a_drift_is_added_evenly_to_what_is_believed() -> None:
 
     assert true.position_enu_m(2.0) == (0.0, 1.0, 0.0)
     assert true.position_enu_m(6.0) == (4.0, 3.0, 0.0)
+
+
+@pytest.mark.parametrize("change_m_s2", [None, 1.5])
+def test_pairs_that_are_far_from_each_other_all_the_time_change_nothing(
+    change_m_s2: float | None,
+) -> None:
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        tracks = {f"u{number}": random_track(rng, change_m_s2) for number in range(8)}
+        pairs = [
+            found
+            for one, other in itertools.combinations(tracks, 2)
+            if (found := closest_approach({one: tracks[one], other: tracks[other]})) is not None
+        ]
+        assert closest_approach(tracks) == min(pairs, key=lambda found: found.distance_m)
+
+
+def test_boxes_hold_all_places_at_which_a_vehicle_is() -> None:
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        tracks = [random_track(rng, 1.5) for _ in range(2)]
+        boxes_m = _boxes_m([track.pieces() for track in tracks])
+        least_m = _apart_m(boxes_m, 0)[0]
+        for now_s in np.arange(0.0, 60.0, 0.05).tolist():
+            one, other = (track.position_enu_m(now_s) for track in tracks)
+            if one is not None and other is not None:
+                assert math.dist(one, other) >= least_m
