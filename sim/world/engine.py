@@ -9,7 +9,6 @@ what arrives waits.
 from __future__ import annotations
 
 import heapq
-import itertools
 import math
 from collections import deque
 from collections.abc import Callable, Iterator
@@ -24,11 +23,15 @@ from swarm.protocol.events import (
     CommonEvent,
     LinkChanged,
     MessageReceived,
+    MessagesReceived,
     SnapshotsReceived,
     Tick,
 )
 from swarm.protocol.messages import Snapshot
 from swarm.runtime.shell import Core
+
+_FROM_OTHERS = MessageReceived, MessagesReceived, SnapshotsReceived
+"""What others say; before a core hears it, it is told where its vehicle is."""
 
 
 class EventQueue:
@@ -36,7 +39,8 @@ class EventQueue:
 
     def __init__(self) -> None:
         self._heap: list[tuple[float, int, Callable[[], None]]] = []
-        self._numbers = itertools.count()
+        self.scheduled = 0
+        """How many callbacks there have been so far, those to come included."""
         self._now_s = 0.0
         self._stopped = False
 
@@ -47,7 +51,8 @@ class EventQueue:
     def at(self, time_s: float, callback: Callable[[], None]) -> None:
         """Run ``callback`` at ``time_s``; what is already past runs next, now."""
         when_s = max(time_s, self._now_s)
-        heapq.heappush(self._heap, (when_s, next(self._numbers), callback))
+        heapq.heappush(self._heap, (when_s, self.scheduled, callback))
+        self.scheduled += 1
 
     def after(self, delay_s: float, callback: Callable[[], None]) -> None:
         """Run ``callback`` in ``delay_s``."""
@@ -129,6 +134,7 @@ class Process:
         telemetry: where the vehicle is, if there is one.
         telemetry_s: interval at which that is told to the core, whatever it hears [s]; None: before
             what it hears.
+        together: whether the core takes several messages that come together as one event.
     """
 
     def __init__(
@@ -144,6 +150,7 @@ class Process:
         whole: Callable[[float], Snapshot] | None = None,
         telemetry: Callable[[], Telemetry | None] | None = None,
         telemetry_s: float | None = None,
+        together: bool = False,
     ) -> None:
         self.name = name
         self.writer = writer
@@ -163,6 +170,7 @@ class Process:
         self._whole = whole or snapshot
         self._telemetry = telemetry
         self._telemetry_s = telemetry_s
+        self._together = together
         self._told_s = -math.inf
         self._now_s = -math.inf
         self._tick_at_s = math.inf
@@ -176,7 +184,11 @@ class Process:
 
     def receive(self, fact: CommonEvent) -> None:
         """Something has arrived from the bus."""
-        self.step(fact)
+        if isinstance(fact, MessagesReceived) and not self._together:
+            for message in fact.messages:
+                self.step(MessageReceived(message))
+        else:
+            self.step(fact)
 
     def step(self, event: object) -> None:
         """Step the core and carry out what it wants; later, if the process is held."""
@@ -187,7 +199,7 @@ class Process:
             return
         if isinstance(event, LinkChanged):
             self.linked = event.up
-        heard = isinstance(event, MessageReceived | SnapshotsReceived)
+        heard = isinstance(event, _FROM_OTHERS)
         if heard and self._telemetry_s is None:
             self._tell_telemetry()
         self._act(lambda now_s: self.core.step(event, now_s))

@@ -15,11 +15,12 @@ from swarm.protocol.events import (
     Cell,
     CommonEvent,
     MessageReceived,
+    MessagesReceived,
     PeerGone,
     PeerSeen,
     SnapshotsReceived,
 )
-from swarm.protocol.messages import Message, Snapshot
+from swarm.protocol.messages import Message, Snapshot, TaskEntry
 from swarm.protocol.timing import PRESETS, LinkKind
 from swarm.protocol.uav_messages import Choice, Nearby, Status
 
@@ -80,6 +81,9 @@ class IdealNetwork:
         self._queue = queue
         self._latency_s = latency_s
         self._seats: list[Node] = []
+        self._posting: tuple[Node, list[Message], int] | None = None
+        """Who puts tasks on the board, those that nobody has heard of yet, and how many callbacks
+        there were by then."""
 
     def join(self, seat: Node) -> None:
         """Show the tokens of both to the newcomer and the others."""
@@ -102,7 +106,14 @@ class IdealNetwork:
         self._tell_all(PeerSeen(writer), seat)
 
     def publish(self, sender: Node, message: Message) -> None:
-        """Tell everyone whom it concerns."""
+        """Tell everyone whom it concerns.
+
+        Tasks that are put on the board one right after the other are heard together: to look at
+        each of thousands would take a fleet of hundreds minutes.
+        """
+        if isinstance(message.body, TaskEntry):
+            self._post(sender, message)
+            return
 
         def tell() -> None:
             for seat in tuple(self._seats):
@@ -110,6 +121,25 @@ class IdealNetwork:
                     seat.receive(MessageReceived(message))
 
         self._later(tell)
+
+    def _post(self, sender: Node, message: Message) -> None:
+        if self._posting is not None:
+            before, posted, scheduled = self._posting
+            if before is sender and scheduled == self._queue.scheduled:
+                posted.append(message)
+                return
+        posted = [message]
+
+        def tell() -> None:
+            if self._posting is not None and self._posting[1] is posted:
+                self._posting = None
+            fact = MessagesReceived(tuple(posted))
+            for seat in tuple(self._seats):
+                if seat is not sender:
+                    seat.receive(fact)
+
+        self._later(tell)
+        self._posting = sender, posted, self._queue.scheduled
 
     def ask(self, asker: Node, of: Collection[str] = ()) -> None:
         """All who are asked answer at one instant."""

@@ -433,6 +433,7 @@ class World:
             whole=agent.whole,
             telemetry=partial(self._telemetry, name),
             telemetry_s=self._setting.telemetry_s,
+            together=True,
         )
 
     def _coordinator(

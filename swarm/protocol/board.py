@@ -113,8 +113,6 @@ class TaskBoard:
         self._fleet: Mission | None = None
         """The mission of that brief, without tasks and zones."""
         self._fleet_in_field = False
-        self._tasks: dict[str, tuple[TaskEntry, Task]] = {}
-        """By id, with the entry each was made from."""
         self._limited = False
         """Whether a plain problem does not tell all of some task."""
         self._mission: Mission | None = None
@@ -242,10 +240,7 @@ class TaskBoard:
     def _tasks_now(self) -> list[Task]:
         """In board order; what nothing new was said of is the same as before."""
         self._sort()
-        for entry in self._entries:
-            if (known := self._tasks.get(entry.task)) is None or known[0] is not entry:
-                self._tasks[entry.task] = entry, task_of(entry)
-        return [self._tasks[entry.task][1] for entry in self._entries]
+        return [BOARD_ARRAYS.task(entry) for entry in self._entries]
 
     def _sort(self) -> None:
         """Bring the entries up to date; most changes add one."""

@@ -18,6 +18,8 @@ from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import MissionConfig, PostedTask, TaskEntry, UavSpec
 
 _FLEETS_KEPT = 2
+_TASKS_KEPT = 20_000
+"""As many as a board has room for."""
 
 
 @dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
@@ -49,6 +51,17 @@ class BoardArraysCache:
         """By brief and rates, the one used last at the end."""
         self._fleets: dict[object, tuple[MissionConfig, Mission]] = {}
         """By brief, the last few, with what they are known by."""
+        self._tasks: dict[int, tuple[TaskEntry, Task]] = {}
+        """By identity of its entry, the last ones."""
+
+    def task(self, entry: TaskEntry) -> Task:
+        """The task of ``entry``, the same one as long as it is kept."""
+        known = self._tasks.get(id(entry))
+        if known is None:
+            if len(self._tasks) == _TASKS_KEPT:
+                self._tasks.clear()
+            known = self._tasks[id(entry)] = entry, task_of(entry)
+        return known[1]
 
     def fleet(self, mission: str, brief: MissionConfig) -> Mission:
         """UAVs of ``brief`` as it tells of them, without tasks and zones."""

@@ -339,6 +339,8 @@ class Message:
     `dataclasses.replace` say something else: None."""
     envelope: bytes | None = field(init=False, default=None, repr=False, compare=False)
     """Those bytes with their writer's signature, where the bus has keys (swarm.protocol.seal)."""
+    fingerprint: int | None = field(init=False, default=None, repr=False, compare=False)
+    """What `swarm.protocol.sync.fingerprint` has found; None: nobody has asked."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "key", _key_of(self.mission, self.writer, self.body))
@@ -371,6 +373,7 @@ def as_heard(message: Message, said: bytes, envelope: bytes | None = None) -> Me
     """
     object.__setattr__(message, "said", said)
     object.__setattr__(message, "envelope", envelope)
+    object.__setattr__(message, "fingerprint", None)
     return message
 
 
