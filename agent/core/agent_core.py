@@ -470,7 +470,7 @@ class AgentCore(AgentPart):
             self._commander.hear(report, now_s)
             self._airway.settle(now_s)
         if (restated := self._airway.restated()) is not None:
-            self._say(restated)
+            self._restate(restated)
         self._near_traffic.settle(now_s)
 
     def _end_step(self, now_s: float) -> list[Action]:

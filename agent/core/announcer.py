@@ -69,10 +69,15 @@ class Announcer:
         """The own claim register."""
         return self._replica.register(self._claim_key)
 
-    def say(self, body: Body) -> Publish:
-        """State the new content of an own register, or what is none: status and choice."""
+    def say(self, body: Body, *, instead: bool = False) -> Publish:
+        """State the new content of an own register, or what is none: status and choice.
+
+        Args:
+            body: the content.
+            instead: of what was to be said of the same register, and nobody has heard.
+        """
         message = self._register_writer.say(body)
-        if self._replica.join(message):
+        if self._replica.join(message) and not instead:
             if self._stretch > 1.0 and self._linked and message.key in self._news:
                 self._news.discard(message.key)
                 self._repeats_news = True

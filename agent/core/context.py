@@ -12,7 +12,7 @@ from agent.core.interface import Action, VehicleOrder
 from agent.core.mission_view import MissionView, Peers
 from agent.core.states import AgentStateMachine
 from agent.core.verticals import Verticals
-from swarm.protocol.events import LogLine
+from swarm.protocol.events import LogLine, Publish
 from swarm.protocol.messages import Body
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
@@ -77,6 +77,18 @@ class AgentPart:
         """State the new content of an own register, or what is none: status and choice."""
         said = self._airway.told(body) if isinstance(body, Claim) else body
         self._actions.append(self._announcer.say(said))
+
+    def _restate(self, claim: Claim) -> None:
+        """State the own claim anew, in one word with what this step was to say of it before."""
+        claimed = self._announcer.claimed
+        kept = [
+            action
+            for action in self._actions
+            if not (isinstance(action, Publish) and action.message is claimed)
+        ]
+        unheard = len(kept) < len(self._actions)
+        self._actions[:] = kept
+        self._actions.append(self._announcer.say(self._airway.told(claim), instead=unheard))
 
     def _log(self, text: str, **fields: object) -> None:
         self._actions.append(LogLine(text, fields))
