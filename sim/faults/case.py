@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -21,33 +22,41 @@ from sim.faults.planted_bugs import BUGS
 from sim.faults.schedule import Disturbance, DisturbanceKind, format_schedule, parse_schedule
 from sim.faults.separated_missions import random_separated_mission
 from sim.world.engine import EventQueue, LocalClock, stream
-from sim.world.motion import flown_s
+from sim.world.motion import Point, flown_s
 from sim.world.network import NetworkConditions, Topology
+from sim.world.position_errors import position_errors
 from sim.world.rough_network import RoughNetwork
 from sim.world.settings import Planner, WorldSettings, vehicles_of
 from sim.world.virtual_world import ONLOOKER, OPERATOR_PATIENCE_S, STANDBY, World
 from swarm.allocation import Problem, TeamState, evaluate, rank_of, rule_by_name, run
 from swarm.model import Mission, Plan, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.timing import Timing
+from swarm.protocol.timing import PRESETS, LinkKind, LinkPreset
 from swarm.runtime.errors import Fault, InputError
 
 MOST_UAVS: Final = 6
 MOST_TASKS: Final = 15
 FIRST_WITH_ACCELERATION: Final = 1_000_000
 """Of the seeds; missions of those before stay as they were."""
-TIMING: Final = Timing(status_s=2.0)
-"""The defaults, with a calmer status: nothing but the count of steps depends on it here."""
+STATUS_S: Final = 2.0
+"""Calmer than any preset: nothing but the count of steps depends on it here."""
 FIRST_IN_FIELD: Final = 2_000_000
 """Of the seeds whose missions have all of the field's constraints."""
 FIRST_WITH_SEPARATION: Final = 3_000_000
 """Of the seeds whose UAVs are to keep a distance as well."""
 FIRST_OF_MANY: Final = 4_000_000
 """Of the seeds with separation whose fleets are larger."""
+FIRST_ASTRAY: Final = 5_000_000
+"""Of the seeds with separation whose UAVs are not quite where they believe to be, and lose
+messages all the time; most of their fleets are small, a few large."""
+_LEAST: Final = 2.6
+"""Of the sizes of fleets that are drawn, before they are rounded down to UAVs."""
 CLOCK_PPM: Final = 100.0
 AREA_M: Final = 120.0
 KINDS_OF_TASK: Final = ("look", "lift")
-_HEADER = re.compile(r"fleet((?: [a-z]+=[\w-]+)+)")
+_HEADER = re.compile(r"fleet((?: [a-z]+=[\w.-]+)+)")
+_MOST_LOST_ON_GOOD_LINKS: Final = 0.05
+"""Share of messages; where more are lost, timers are those of bad links."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,6 +78,10 @@ class Case:
     """Whether a second coordinator stands by."""
     bug: str = ""
     """A bug put in on purpose; see `sim.faults.planted_bugs`."""
+    loss_frac: float = 0.0
+    """Share of all messages that are lost, whatever the schedule does besides."""
+    astray_m: float = 0.0
+    """How far a UAV of the field is at most from where it believes to be, and tells the others."""
     schedule: tuple[Disturbance, ...] = ()
     mission: Mission | None = None
     """Flown instead of one drawn from the seed."""
@@ -79,6 +92,8 @@ class Case:
             raise ValueError(f"1..{uavs} UAVs and 1..{tasks} tasks")
         if self.bug and self.bug not in BUGS:
             raise ValueError(f"{self.bug!r} is none of {', '.join(BUGS)}")
+        if not (0.0 <= self.loss_frac <= 1.0 and 0.0 <= self.astray_m < math.inf):
+            raise ValueError("loss must be within 0..1, and astray 0 m or more")
 
     def flown(self) -> Mission:
         """The mission."""
@@ -89,6 +104,12 @@ class Case:
             draw = random_separated_mission if apart else random_field_mission
             return draw(self.seed, most_of(self.seed), self.uavs, self.tasks, self.popups)
         return _random_mission(self.seed, self.uavs, self.tasks, self.popups)
+
+    def link(self) -> LinkPreset:
+        """Settings of what joins the fleet, as a user would choose them for so many losses."""
+        good = self.loss_frac <= _MOST_LOST_ON_GOOD_LINKS
+        chosen = PRESETS[LinkKind.NORMAL if good else LinkKind.BAD]
+        return replace(chosen, timing=replace(chosen.timing, status_s=STATUS_S))
 
     def processes(self) -> tuple[str, ...]:
         """Names of all processes that a fault may befall."""
@@ -108,7 +129,16 @@ class CaseResult:
 
 
 def most_of(seed: int) -> tuple[int, int]:
-    """How many UAVs and tasks the mission of that seed may have."""
+    """How many UAVs and tasks the mission of that seed may have.
+
+    From `FIRST_ASTRAY` on the number of UAVs is drawn from a Pareto distribution of exponent 2:
+    a quarter of the fleets have two, a third three, one in seven more than six, one in seventy more
+    than twenty.
+    """
+    if seed >= FIRST_ASTRAY:
+        larger = 1.0 - float(stream(seed, "size").random()) * (1.0 - (_LEAST / 41.0) ** 2)
+        uavs = int(_LEAST / math.sqrt(larger))
+        return uavs, max(MOST_TASKS, uavs * 3 // 2)
     return (40, 60) if seed >= FIRST_OF_MANY else (MOST_UAVS, MOST_TASKS)
 
 
@@ -146,12 +176,16 @@ def play(
 ) -> CaseResult:
     """Fly ``case`` to its end, or until an invariant breaks; ``join`` makes its network."""
     network: list[RoughNetwork] = []
+    link = case.link()
+    conditions = NetworkConditions(
+        case.topology, lease_s=link.lease_s, answer_s=link.answer_s, loss_frac=case.loss_frac
+    )
 
     def make_network(queue: EventQueue) -> RoughNetwork:
-        network.append(join(queue, NetworkConditions(case.topology), case.seed))
+        network.append(join(queue, conditions, case.seed))
         return network[0]
 
-    mission, judge = case.flown(), InvariantChecker()
+    mission, judge = case.flown(), InvariantChecker(case.astray_m)
     bug: AbstractContextManager[None] = BUGS[case.bug]() if case.bug else nullcontext()
     with bug:
         world = World(
@@ -159,7 +193,7 @@ def play(
             make_plan,
             method=case.method,
             seed=case.seed,
-            timing=TIMING,
+            timing=link.timing,
             setting=WorldSettings(
                 network=make_network,
                 clocks=_clocks(case),
@@ -169,7 +203,7 @@ def play(
                 },
                 plan_s=0.05,
                 telemetry_s=TELEMETRY_S,
-                vehicle=vehicles_of(mission),
+                vehicle=vehicles_of(mission, errors=_position_errors(case)),
             ),
             watch=judge,
         )
@@ -186,7 +220,7 @@ def limit_s(case: Case) -> float:
     The slowest flies from task to task across the area; refusals, a missing coordinator, an
     operator who is not heard and a stalemate take their time.
     """
-    mission = case.flown()
+    mission, timing = case.flown(), case.link().timing
     last_s = max((each.ends_s for each in case.schedule), default=0.0)
     slow = min(
         (e.amount or 1.0 for e in case.schedule if e.kind is DisturbanceKind.SLOW), default=1.0
@@ -203,8 +237,8 @@ def limit_s(case: Case) -> float:
     if any(each.kind is DisturbanceKind.HOLD for each in case.schedule):
         last_s += OPERATOR_PATIENCE_S
     if is_field(mission):
-        work_s += _field_work_s(mission, across_s) + TIMING.clear_s
-    waits_s = TIMING.abandon_s + TIMING.stalemate_s + 2.0 * TIMING.reconsider_s + 60.0
+        work_s += _field_work_s(mission, across_s) + timing.clear_s
+    waits_s = timing.abandon_s + timing.stalemate_s + 2.0 * timing.reconsider_s + 60.0
     return max(last_s, appears_s) + work_s + waits_s
 
 
@@ -221,6 +255,8 @@ def format_case(case: Case) -> str:
     facts = {"seed": case.seed, "uavs": case.uavs, "tasks": case.tasks, "popups": case.popups}
     words = {**facts, "topology": case.topology.value, "method": case.method}
     words |= {"standby": "yes" if case.standby else "", "bug": case.bug}
+    words |= {"loss": f"{case.loss_frac:g}" if case.loss_frac else ""}
+    words |= {"astray": f"{case.astray_m:g}" if case.astray_m else ""}
     header = " ".join(f"{key}={value}" for key, value in words.items() if value != "")
     return f"fleet {header}\n{format_schedule(case.schedule)}"
 
@@ -248,6 +284,8 @@ def parse_case(lines: Iterable[str], source: str) -> Case:
             method=words.pop("method", "greedy"),
             standby=words.pop("standby", "no") == "yes",
             bug=words.pop("bug", ""),
+            loss_frac=float(words.pop("loss", "0")),
+            astray_m=float(words.pop("astray", "0")),
         )
         if words:
             raise ValueError(f"unknown: {', '.join(words)}")
@@ -295,6 +333,12 @@ def _random_mission(seed: int, uavs: int, tasks: int, popups: int) -> Mission:
 def _point(rng: np.random.Generator, size_m: float) -> tuple[float, float, float]:
     east_m, north_m = rng.uniform(0.0, size_m, 2).tolist()
     return east_m, north_m, 0.0
+
+
+def _position_errors(case: Case) -> Callable[[str], Iterator[Point]] | None:
+    if case.astray_m == 0.0:
+        return None
+    return lambda uav: position_errors(case.seed, uav, case.astray_m)
 
 
 def _clocks(case: Case) -> dict[str, LocalClock]:

@@ -58,12 +58,16 @@ def soak(
     that fails is made as small as possible, printed, and written to a file that --replay plays
     again. Seeds from 1000000 on have accelerations, those from 2000000 on all of the field's
     constraints: batteries, bases, zones, wind, windows; from 3000000 on UAVs keep apart, and from
-    4000000 on there are up to 40 of them. Exit status 0: every invariant held.
+    4000000 on there are up to 40 of them. From 5000000 on fleets of 2 to 40, most of them small,
+    keep apart that also lose up to 20 % of their messages all along, and are up to 1 m from where
+    they believe to be, each in a direction that changes: nobody may come nearer than the
+    separation less that metre. Exit status 0: every invariant held.
 
     Examples:
         swarm soak --seeds 10000
         swarm soak --seeds 500 --faults cut,crash --first 20000
         swarm soak --seeds 500 --first 2000000
+        swarm soak --seeds 500 --first 5000000
         swarm soak --replay failing.case
     """
     import sys

@@ -61,7 +61,8 @@ class FieldJudge:
     What an agent can promise of zones follows from what it knows. It knows where its vehicle was
     ``stale_s`` ago or less. Who is sent elsewhere in flight therefore flies from up to
     speed · ``stale_s`` beside where its way was reckoned from, and so far beside that way at most:
-    to be kept out by more than that is what a margin is for.
+    to be kept out by more than that is what a margin is for. The same goes for the ``astray_m``
+    that it is at most from where it believes to be, in height too.
 
     Whoever hears of a zone that it is in orders its way out in the step in which it hears of it,
     or, if it has to ask others first what it has missed, when they have answered: at the latest
@@ -76,6 +77,8 @@ class FieldJudge:
     """Until when everybody has heard of a zone, and ordered its way out [s]."""
     stale_s: float = 0.0
     """How old what an agent knows of its vehicle's place may be [s]."""
+    astray_m: float = 0.0
+    """How far UAVs are at most from where they believe to be [m]."""
     flaws: Sequence[VehicleFlaw] = ()
 
     def complaints(self, zones: Sequence[DrawnZone] | None = None) -> list[tuple[str, str]]:
@@ -100,14 +103,15 @@ class FieldJudge:
         speeds_m_s = {str(uav.id): uav.speed_m_s for uav in self.world.mission.uavs}
         for drawn in zones:
             for uav, track in self.world.tracks.items():
-                forbidden = _forbidden(drawn.zone, margin_m, self.stale_s * speeds_m_s[uav])
+                beside_m = self.astray_m + self.stale_s * speeds_m_s[uav]
+                forbidden = _forbidden(drawn.zone, margin_m, beside_m)
                 since_s = drawn.heeded_by_s(uav, self.reaction_s)
                 if since_s == math.inf:
                     continue
                 leaves_s = self._leaves_s(uav, since_s, forbidden) if drawn.since_s > 0.0 else 0.0
                 outside, cut_s = leaves_s == 0.0, min(max(since_s, leaves_s), drawn.until_s)
                 pieces = [*track.pieces(since_s, cut_s), *track.pieces(cut_s, drawn.until_s)]
-                for begin_s, enters in _chords_in(pieces, drawn.zone, forbidden):
+                for begin_s, enters in _chords_in(pieces, drawn.zone, forbidden, self.astray_m):
                     outside = outside or not enters
                     if enters and (outside or begin_s >= leaves_s):
                         yield f"{uav} in {drawn.zone.id} at {begin_s:.3f} s"
@@ -133,7 +137,7 @@ class FieldJudge:
             speed_m_s = min(speed_m_s, against_m_s)
         stops_s = 0.0 if a_m_s2 is None else row.speed_m_s / a_m_s2
         out_m = float(shapely.distance(shapely.boundary(forbidden), shapely.Point(place[:2])))
-        out_m += row.speed_m_s * (stops_s / 2.0 + self.stale_s)
+        out_m += row.speed_m_s * (stops_s / 2.0 + self.stale_s) + self.astray_m
         takes_s = flown_s(out_m, speed_m_s, a_m_s2) / _slowest(self.flaws, uav)
         return since_s + stops_s + takes_s
 
@@ -194,15 +198,18 @@ def _forbidden(zone: Zone, margin_m: float, astray_m: float) -> shapely.Geometry
 
 
 def _chords_in(
-    pieces: Iterable[MotionPiece], zone: Zone, forbidden: shapely.Geometry
+    pieces: Iterable[MotionPiece], zone: Zone, forbidden: shapely.Geometry, astray_m: float
 ) -> Iterator[tuple[float, bool]]:
-    """When each chord of a flight begins [s], and whether it meets what is forbidden."""
+    """When each chord of a flight begins [s], and whether it meets what is forbidden.
+
+    That is so by its heights where they are farther than ``astray_m`` from floor and ceiling.
+    """
     import shapely
 
     for piece in pieces:
         instants_s, places = _chords(piece)
         heights_m = [up_m for _, _, up_m in places]
-        if not zone.concerns(min(heights_m), max(heights_m)):
+        if not zone.concerns(min(heights_m) + astray_m, max(heights_m) - astray_m):
             yield piece.begin_s, False
             continue
         for begin_s, (one, other) in zip(instants_s, pairwise(places), strict=False):

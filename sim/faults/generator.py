@@ -10,7 +10,7 @@ import numpy as np
 
 from coordinator.planner.field_plan import is_field
 from coordinator.planner.plan import make_plan
-from sim.faults.case import Case, CaseResult, most_of, play
+from sim.faults.case import FIRST_ASTRAY, Case, CaseResult, most_of, play
 from sim.faults.field_missions import fair_drain_frac
 from sim.faults.schedule import (
     FIELD_KINDS,
@@ -29,6 +29,8 @@ from swarm.model.ids import COORDINATOR
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
+ASTRAY_M = 1.0
+"""At most; ways are planned 2 m farther apart than UAVs are to be, for one of either."""
 SPAN_S = 40.0
 """Faults of random fleets begin within this time, which most of their missions take."""
 
@@ -53,12 +55,16 @@ def kinds_of(text: str, source: str) -> tuple[DisturbanceKind, ...]:
 def random_case(
     seed: int, kinds: Collection[DisturbanceKind] = tuple(DisturbanceKind), bug: str = ""
 ) -> Case:
-    """A fleet of 2 to 6 UAVs with 3 to 15 tasks, or more, and 1 to 6 things that go wrong."""
+    """A fleet of 2 to 6 UAVs with 3 to 15 tasks, or more, and 1 to 6 things that go wrong.
+
+    From `FIRST_ASTRAY` on UAVs are up to `ASTRAY_M` from where they believe to be, and in two of
+    three missions up to 20 % of all messages are lost.
+    """
     rng, (most_uavs, most_tasks) = stream(seed, "case"), most_of(seed)
     tasks = int(rng.integers(3, most_tasks + 1))
     case = Case(
         seed=seed,
-        uavs=int(rng.integers(2, most_uavs + 1)),
+        uavs=most_uavs if seed >= FIRST_ASTRAY else int(rng.integers(2, most_uavs + 1)),
         tasks=tasks,
         popups=int(rng.integers(0, 1 + tasks // 3)),
         topology=Topology(str(rng.choice([each.value for each in Topology]))),
@@ -66,6 +72,9 @@ def random_case(
         standby=bool(rng.random() < 0.3),
         bug=bug,
     )
+    if seed >= FIRST_ASTRAY:
+        lost_frac = max(0.0, float(stream(seed, "loss").uniform(-0.1, 0.2)))
+        case = replace(case, loss_frac=round(lost_frac, 3), astray_m=ASTRAY_M)
     schedule = random_schedule(seed, kinds, case.flown(), SPAN_S, standby=case.standby)
     return replace(case, schedule=schedule)
 

@@ -54,9 +54,12 @@ class FaultInjector:
 
     @property
     def calm_for_s(self) -> float:
-        """How long nothing has gone wrong that goes on or that has to be got over [s]."""
+        """How long nothing has gone wrong that goes on or that has to be got over [s].
+
+        Where messages are lost all the time it is never calm.
+        """
         calm_s = self._world.queue.now_s() - self._disturbed_s
-        return -math.inf if self._in_force else calm_s
+        return -math.inf if self._in_force or self._network.is_lossy else calm_s
 
     def _begin(self, what: Disturbance) -> None:
         world, network, names = self._world, self._network, what.names

@@ -18,7 +18,8 @@ Beside the invariants of the messages (sim.faults.message_log):
   coordinator ended the mission. Who found no way there while somebody was lost or not heard, had
   to land where it was, or come home from a hold, was not able to do it;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
-- *too near*: no two UAVs in the air are nearer to each other than the mission's separation;
+- *too near*: no two UAVs in the air are nearer to each other than the mission's separation, less
+  how far one of them may be from where it believes to be;
 - in the field those of `sim.faults.field_judge`, but for batteries of UAVs whose agents were no
   longer at work, or stopped by the operator; there a task is not lost that nobody could have done;
 - *miscounted*: the observer knows the visits of every UAV that left in calm, invents none, and
@@ -74,13 +75,18 @@ _IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
 
 
 class InvariantChecker:
-    """Watches one world (`sim.world.settings.WorldListener`); the first breach ends the run."""
+    """Watches one world (`sim.world.settings.WorldListener`); the first breach ends the run.
+
+    Args:
+        astray_m: how far UAVs are at most from where they believe to be [m].
+    """
 
     _world: World
     _network: RoughNetwork
     _injector: FaultInjector
 
-    def __init__(self) -> None:
+    def __init__(self, astray_m: float = 0.0) -> None:
+        self._astray_m = astray_m
         self.message_log = MessageLog()
         self._lives: dict[Process, int] = {}
         self._changed_s: dict[str, float] = {}
@@ -392,7 +398,8 @@ class InvariantChecker:
             heed = {uav: s for uav, s in known_s.items() if uav not in self._injector.left_alone}
             zones.append(replace(drawn, known_s=heed))
         flaws = self._injector.flaws
-        judge = FieldJudge(self._world, _LATE_S, stale_s=TELEMETRY_S, flaws=flaws)
+        known = {"stale_s": TELEMETRY_S, "astray_m": self._astray_m}
+        judge = FieldJudge(self._world, _LATE_S, flaws=flaws, **known)
         for invariant, text in judge.complaints(zones):
             uav = text.partition(" ")[0]
             if not (invariant == "fell" and uav in self._injector.left_alone):
@@ -401,11 +408,14 @@ class InvariantChecker:
     def _look_at_the_distances(self) -> None:
         asked_m = self._world.mission.separation_m
         nearest = None if asked_m is None else closest_approach(self._world.tracks)
-        if nearest is not None and asked_m is not None and nearest.distance_m < asked_m - _NEAR_M:
+        if nearest is None or asked_m is None:
+            return
+        least_m = asked_m - self._astray_m
+        if nearest.distance_m < least_m - _NEAR_M:
             one, other = nearest.uavs
             text = (
                 f"{one} and {other} are {nearest.distance_m:.2f} m from each other at "
-                f"{nearest.at_s:.2f} s, not {asked_m:g} m"
+                f"{nearest.at_s:.2f} s, not {least_m:g} m"
             )
             self._break("too near", text)
 

@@ -157,6 +157,10 @@ def _smaller_fleets(case: Case) -> Iterator[Case]:
             yield replace(case, popups=popups - 1)
     if case.standby and not any("standby" in each.names for each in case.schedule):
         yield replace(case, standby=False)
+    if case.loss_frac:
+        yield replace(case, loss_frac=0.0)
+    if case.astray_m:
+        yield replace(case, astray_m=0.0)
     if case.method != "greedy":
         yield replace(case, method="greedy")
     if case.topology is not Topology.ROUTER:

@@ -2,13 +2,14 @@
 
 It flies paths in the times that are planned for them, drains its battery by airborne time, lands
 for another one, and falls out of the sky when it is empty. In a realization it flies at its own
-speed and not quite where it thinks, as `StochasticVehicle` does.
+speed and not quite where it thinks, as `StochasticVehicle` does; with position errors it is never
+quite where it thinks.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 
 from agent.core.interface import (
     Arrived,
@@ -58,6 +59,8 @@ class FieldVehicle(TracedVehicle):
         paths: of its mission.
         takeoff_s: from the order to prepare to the report that it is ready.
         fate: what comes true; None for an ideal one.
+        errors: from where it believes to be to where it is, at first and at the end of each of its
+            ways [m]; between them that changes evenly. None for one that knows where it is.
     """
 
     def __init__(
@@ -68,6 +71,7 @@ class FieldVehicle(TracedVehicle):
         paths: FieldPaths,
         takeoff_s: float = 0.0,
         fate: Realization | None = None,
+        errors: Iterator[Point] | None = None,
     ) -> None:
         super().__init__()
         self._queue, self._report, self._paths = queue, report, paths
@@ -93,7 +97,8 @@ class FieldVehicle(TracedVehicle):
         self._swap_ends_s = -math.inf
         self._swapped = False
         """Whether it stands with another battery, or is about to get one."""
-        self._astray_m = self._becomes_m = _AT_REST
+        self._errors = errors
+        self._astray_m = self._becomes_m = _AT_REST if errors is None else next(errors)
         """From where it believes to be to where it is, at both ends of its path [m]."""
         self._orders = 0
 
@@ -250,7 +255,7 @@ class FieldVehicle(TracedVehicle):
             ends_m = ends_m[0], ends_m[0]  # it stays where it is, which need not be in its layer
         path = self._paths.path(self._uav.id, (here, *via_enu_m, stop_enu_m), ends_m)
         self._layers_m, self._leaves_s = ends_m, now_s
-        self._becomes_m = self._stops_astray_m(name)
+        self._becomes_m = self._stops_astray_m(name, path)
         pace = self.speed_frac * self._true_pace(name, path)
         self._path = path = path.lasting(path.duration_s / pace)
         true = drifting(path.pieces(now_s), self._astray_m, self._becomes_m)
@@ -319,7 +324,9 @@ class FieldVehicle(TracedVehicle):
         battery.touch_down(now_s)
         self.when_empty()
 
-    def _stops_astray_m(self, name: str | None) -> Point:
+    def _stops_astray_m(self, name: str | None, path: FlownPath) -> Point:
+        if self._errors is not None:
+            return next(self._errors) if path.duration_s > 0.0 else self._astray_m
         task = self._tasks.get(name or "")
         if self._fate is None or task is None:
             return self._astray_m
@@ -359,14 +366,21 @@ class FieldVehicle(TracedVehicle):
 
 
 def field_vehicles(
-    mission: Mission, takeoff_s: float = 0.0, fate: Realization | None = None
+    mission: Mission,
+    takeoff_s: float = 0.0,
+    fate: Realization | None = None,
+    errors: Callable[[str], Iterator[Point]] | None = None,
 ) -> VehicleFactory:
-    """Vehicles of the UAVs of a ``mission`` in the field; ideal ones without a realization."""
+    """Vehicles of the UAVs of a ``mission`` in the field; ideal ones without a realization.
+
+    ``errors`` are those of the position of each UAV; see `FieldVehicle`.
+    """
     paths = FieldPaths(mission)
 
     def make(
         queue: EventQueue, uav: str, report: Callable[[VehicleReport], None]
     ) -> SimulatedVehicle:
-        return FieldVehicle(queue, uav, report, paths, takeoff_s, fate)
+        astray = None if errors is None else errors(uav)
+        return FieldVehicle(queue, uav, report, paths, takeoff_s, fate, astray)
 
     return make

@@ -190,6 +190,11 @@ class RoughNetwork:
             for other in seen:
                 self._tell_gone(seat, other)
 
+    @property
+    def is_lossy(self) -> bool:
+        """Whether messages are lost in any weather."""
+        return self._conditions.loss_frac > 0.0
+
     def worsen(self, by: float) -> None:
         """Change the weather."""
         self._weather += by

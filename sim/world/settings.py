@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
 from typing import Protocol
@@ -13,6 +13,7 @@ from coordinator.core.lifecycle import Replan
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.planner.online import ReplanResult, replan
 from sim.world.engine import EventQueue, LocalClock, Process
+from sim.world.motion import Point
 from sim.world.network import Network
 from sim.world.uncertainty import Realization
 from sim.world.vehicles import IdealVehicle, SimulatedVehicle, VehicleFactory
@@ -49,14 +50,20 @@ def ideal_vehicle(
 
 
 def vehicles_of(
-    mission: Mission, takeoff_s: float = 0.0, fate: Realization | None = None
+    mission: Mission,
+    takeoff_s: float = 0.0,
+    fate: Realization | None = None,
+    errors: Callable[[str], Iterator[Point]] | None = None,
 ) -> VehicleFactory:
-    """Ideal vehicles of the UAVs of ``mission``, or those of a realization in the field."""
+    """Ideal vehicles of the UAVs of ``mission``, or those of a realization in the field.
+
+    ``errors`` of positions are for missions in the field alone.
+    """
     if PLAIN_CONSTRAINTS.issuperset(mission.constraints):
         return ideal_vehicle
     from sim.world.field_vehicle import field_vehicles  # plain missions never load it
 
-    return field_vehicles(mission, takeoff_s, fate)
+    return field_vehicles(mission, takeoff_s, fate, errors)
 
 
 class RestartMemory(StrEnum):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from coordinator.mission_view.results import MissionResult
-from sim.faults.case import TIMING, Case, CaseResult, limit_s, play, quick_plan
+from sim.faults.case import Case, CaseResult, limit_s, play, quick_plan
 from sim.faults.schedule import parse_schedule
 from sim.world.engine import EventQueue
 from sim.world.network import NetworkConditions, Node
@@ -153,7 +153,7 @@ def test_what_one_who_is_revoked_leaves_is_done_by_the_others(seed: int) -> None
         quick_plan,
         method=flown.method,
         seed=seed,
-        timing=TIMING,
+        timing=flown.link().timing,
         setting=WorldSettings(network=join, plan_s=0.05, telemetry_s=0.2),
     )
     before: list[MissionResult] = []

@@ -211,6 +211,18 @@ def test_who_turns_in_flight_may_be_astray_by_what_its_agent_does_not_know_yet()
     assert [each for each, _ in FieldJudge(world, stale_s=0.1).complaints()] == ["in a zone"]
 
 
+@pytest.mark.parametrize("floor_m", [0.0, 9.5])
+def test_who_is_astray_may_be_in_a_zone_by_that_much_but_not_more(floor_m: float) -> None:
+    inside_m = 1.5 if floor_m == 0.0 else 5.0  # of the border, or half a metre above the floor
+    astray_m = 1.5 if floor_m == 0.0 else 0.5
+    world = on_a_way((0.0, 0.0, 10.0 - inside_m), (20.0, 200.0, 10.0 - inside_m))
+    world.mission = replace(MISSION, zones=(replace(ZONE, floor_m=floor_m),))
+
+    assert [each for each, _ in FieldJudge(world, astray_m=astray_m).complaints()] == []
+    less_m = astray_m - 0.1
+    assert [each for each, _ in FieldJudge(world, astray_m=less_m).complaints()] == ["in a zone"]
+
+
 @pytest.mark.parametrize(
     ("out_s", "uav", "flaws", "is_sound"),
     [

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from itertools import accumulate, pairwise
+from itertools import accumulate, islice, pairwise
 
 import pytest
 
@@ -30,6 +30,7 @@ from sim.world.field_paths import FieldPaths
 from sim.world.field_vehicle import FieldVehicle
 from sim.world.flight_log import FlightLog
 from sim.world.motion import Point
+from sim.world.position_errors import position_errors
 from sim.world.uncertainty import Uncertainty
 from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId
 from swarm.model.layers import FlightLayers
@@ -282,6 +283,40 @@ def test_in_a_realization_it_flies_at_its_own_pace() -> None:
     stop = fate.stop_enu_m(UavId("u0"), task)
     true = vehicle.track.position_enu_m(50.0)
     assert true == pytest.approx((stop[0], stop[1], LAYER_M))
+
+
+def test_with_errors_it_is_beside_its_way_by_what_changes_from_one_to_the_next() -> None:
+    queue, errors = EventQueue(), [(1.0, 0.0, 0.5), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)]
+    paths = FieldPaths(MISSION)
+    vehicle = FieldVehicle(queue, "u0", lambda _: None, paths, errors=iter(errors))
+    vehicle.order(Prepare(above(0.0), 10.0), VehicleReady())
+    vehicle.order(GoTo(1, above(50.0)), VehicleReady())
+    queue.at(2.5, lambda: None)
+    queue.run(2.5)
+    told = vehicle.telemetry()
+    assert told is not None
+    assert told.position_enu_m == pytest.approx(above(25.0))
+    assert vehicle.track.position_enu_m(0.0) == pytest.approx((1.0, 0.0, LAYER_M + 0.5))
+    assert vehicle.track.position_enu_m(2.5) == pytest.approx((25.5, -0.5, LAYER_M + 0.25))
+
+    vehicle.order(Hold("a test"), VehicleReady())  # where it stops nothing has changed
+    assert vehicle.track.position_enu_m(10.0) == pytest.approx((25.5, -0.5, LAYER_M + 0.25))
+    vehicle.order(GoTo(2, above(25.0)), VehicleReady())  # nor where it stays
+    assert vehicle.track.position_enu_m(10.0) == pytest.approx((25.5, -0.5, LAYER_M + 0.25))
+    vehicle.order(GoTo(3, above(0.0)), VehicleReady())
+    queue.run(10.0)
+    assert vehicle.track.position_enu_m(10.0) == pytest.approx((0.0, 0.0, LAYER_M + 1.0))
+
+
+def test_errors_are_anywhere_in_their_ball_and_each_uav_has_its_own() -> None:
+    drawn = {uav: list(islice(position_errors(7, uav, 2.0), 500)) for uav in ("u0", "u1")}
+    off_m = [math.hypot(*error) for error in drawn["u0"]]
+
+    assert drawn["u0"] == list(islice(position_errors(7, "u0", 2.0), 500))
+    assert drawn["u0"] != drawn["u1"]
+    assert max(off_m) <= 2.0
+    assert 0.4 < sum(each > 2.0 * 0.5 ** (1.0 / 3.0) for each in off_m) / 500 < 0.6
+    assert all(abs(sum(axis)) / 500 < 0.2 for axis in zip(*drawn["u0"], strict=True))
 
 
 class ScriptedPilot:
