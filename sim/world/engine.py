@@ -182,7 +182,7 @@ class Process:
         if self._telemetry_s is not None:
             self._queue.after(self._telemetry_s, self._stream_telemetry)
 
-    def receive(self, fact: CommonEvent) -> None:
+    def receive(self, fact: CommonEvent | MessagesReceived) -> None:
         """Something has arrived from the bus."""
         if isinstance(fact, MessagesReceived) and not self._together:
             for message in fact.messages:

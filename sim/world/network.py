@@ -38,7 +38,7 @@ class Node(Protocol):
     cells: frozenset[Cell]
     """Of the sky, whose traffic it hears."""
 
-    def receive(self, fact: CommonEvent) -> None:
+    def receive(self, fact: CommonEvent | MessagesReceived) -> None:
         """Something has arrived; nothing happens any more at the seat of one that ended."""
         ...
 
@@ -219,7 +219,7 @@ class RouterNode:
     writer: str | None = None
     cells: frozenset[Cell] = frozenset()
 
-    def receive(self, fact: CommonEvent) -> None:
+    def receive(self, fact: CommonEvent | MessagesReceived) -> None:
         """Routers take no part."""
 
     def answer(self, *, whole: bool = False) -> Snapshot | None:

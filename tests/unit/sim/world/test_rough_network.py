@@ -16,6 +16,7 @@ from swarm.protocol.events import (
     CommonEvent,
     LinkChanged,
     MessageReceived,
+    MessagesReceived,
     PeerGone,
     PeerSeen,
     SnapshotsReceived,
@@ -41,7 +42,8 @@ class Listener:
     cells: frozenset[tuple[int, int]] = frozenset()
     told: list[tuple[float, CommonEvent]] = field(default_factory=list)
 
-    def receive(self, fact: CommonEvent) -> None:
+    def receive(self, fact: CommonEvent | MessagesReceived) -> None:
+        assert not isinstance(fact, MessagesReceived)  # on a rough network each word is alone
         self.told.append((self.queue.now_s(), fact))
 
     def answer(self, *, whole: bool = False) -> Snapshot | None:
