@@ -78,8 +78,7 @@ class Airway:
         """By when the UAV must have landed, its reserve kept [s mission time]."""
         self._fleet = FleetAir(uav, replica, mission_view, peers)
         self._way: ClaimedWay | None = None
-        self._aloft = False
-        self._moves = False
+        self._aloft = self._moves = False
         """Whether the vehicle may be anywhere on its way."""
         self._stops = False
         """Whether it has been told to stop, for the wish to be asked from there."""
@@ -96,6 +95,7 @@ class Airway:
         self._granted: dict[str, int] = {}
         self._keeps: tuple[int, ...] = ()
         """Seats that it has taken over."""
+        self._sits = True
         self._whole: ClaimedWay | None = None
         """What it says of its way, with what it grants."""
         self._made_of: tuple[object, ...] = ()
@@ -142,8 +142,6 @@ class Airway:
                 self._way = replace(landed(self._told_way), heir=heir)
             case Refused(order=GoTo(leg=leg)) if leg == self._flown_leg:
                 self._moves = True
-            case _:
-                pass
         return event
 
     def recall(self, claim: Claim) -> None:
@@ -273,26 +271,31 @@ class Airway:
             Orders that are given up, since no way becomes free, or advice to land where it is.
         """
         air, claim = self._shared, self._replica.claims.get(self._uav)
-        if air is None or claim is None:
-            return []
-        if not self._has_changed(now_s):
+        if air is None or claim is None or not self._has_changed(now_s):
             return []
         self._fleet.note_losses()
         given_up = self._press(air, now_s)
         others = self._fleet.heard(), self._fleet.expired()
         self._keeps = air.inherited(self._uav, self._claims(), *others)
         self._granted = air.granted(self._uav, self._claims(), *others)
+        self._sits = bool(air.stacks_of(self._uav, self._claims(), others[1]))
         self._depart_if_granted(air, now_s)
         return given_up
+
+    def concerned(self, writer: str, said: Claim) -> bool:
+        """Whether `settle` has something to do once ``writer`` has said so."""
+        air = self._shared
+        if air is None or self._sits or self._granted or self._stops or self._aside is not None:
+            return air is not None
+        return air.concerns(self._uav, writer, said, self._replica.claims)
 
     def _has_changed(self, now_s: float) -> bool:
         """Whether anything is new since the last look: most steps are about something else."""
         due_s = self.next_deadline_s()
         told = (self._way, self._wish, self._aside, self._stops, self._moves, self._aloft)
         now = (*self._replica.claims.values(), *told, len(self._fleet.heard()))
-        same = now == self._settled and (due_s is None or due_s > now_s)
-        self._settled = now
-        return not same
+        before, self._settled = self._settled, now
+        return now != before or (due_s is not None and due_s <= now_s)
 
     def restated(self) -> Claim | None:
         """The own claim, if what is to be told of the air has changed since it was said."""
@@ -412,8 +415,8 @@ class Airway:
         works = self._wish is None and claims[self._uav].phase is not ClaimPhase.IDLE
         if self._moves or not self._aloft or not here.path_enu_m or works:
             return False
-        place = np.array(here.path_enu_m)
-        for uav in air.in_the_way(self._uav, place, claims, self._fleet.expired()):
+        place, expired = np.array(here.path_enu_m), self._fleet.expired()
+        for uav in air.in_the_way(self._uav, place, claims, expired):
             if self._wish is not None and strength(self._uav, claims) < strength(uav, claims):
                 continue
             high, corner = self._at_own_height, self._nominal(here.path_enu_m[0])
@@ -432,8 +435,8 @@ class Airway:
         path, place = way.path_enu_m, self._place
         asking = air.in_the_way(self._uav, np.array(path), claims, self._fleet.expired())
         left = path if place is None else not_flown(path, place)
-        rest = np.array(left)
-        if any(apart(air.slabs, rest, air.wanted(uav, air.way(uav, claims))) for uav in asking):
+        wanted = (air.wanted(uav, air.way(uav, claims)) for uav in asking)
+        if any(apart(air.slabs, np.array(left), each) for each in wanted):
             self._way = replace(way, path_enu_m=left)
         return bool(asking)
 
@@ -456,8 +459,7 @@ class Airway:
 
     def _depart(self, wish: Wish) -> None:
         """Send the vehicle along the way that is its own now."""
-        way, order = self._told_way, wish.order
-        path = way.path_enu_m
+        way, order, path = self._told_way, wish.order, self._told_way.path_enu_m
         self._left_base |= self._stands_at is not None
         self._moves, self._aloft = len(path) > 1, True
         self._stands_at = self._lifts_enu_m = None
@@ -487,8 +489,8 @@ class Airway:
         return ClaimedWay(0, first, flies=bool(first), grounded=not self._aloft)
 
     def _number(self) -> int:
-        mission_ms = round(1e3 * self._mission_view.mission_s(self._mission_view.now_s))
-        return max(self._told_way.number + 1, mission_ms)
+        mission_s = self._mission_view.mission_s(self._mission_view.now_s)
+        return max(self._told_way.number + 1, round(1e3 * mission_s))
 
     def _nominal(self, place: Point) -> Point:
         return nominal(place, self._told_way, own_height=self._own_height)

@@ -46,18 +46,17 @@ class Attention(AgentPart):
         return True
 
     def _busy_with(self) -> str | None:
-        """The task that this UAV flies to or works at; None where more is to be thought of.
-
-        Where the air is shared, those are the ways of others.
-        """
-        brief, claim = self._replica.brief, self._replica.claims.get(self._uav)
+        """The task that this UAV flies to or works at; None where more is to be thought of."""
+        claim = self._replica.claims.get(self._uav)
         if claim is None or self._machine.state not in BUSY or self._shows_stations:
             return None
-        return claim.task if brief is not None and brief.separation_m is None else None
+        return claim.task
 
     def _is_about_another(self, message: Message, task: str) -> bool:
-        """Whether a UAV that is there says what it does about another task."""
-        body = message.body
+        """Whether a UAV that is there says what it does about another task, and elsewhere."""
+        body, writer = message.body, message.writer
         if not isinstance(body, Claim | Outcome) or body.task == task:
             return False
-        return self._peers.membership.is_credible(message.writer)
+        if not self._peers.membership.is_credible(writer):
+            return False
+        return isinstance(body, Outcome) or not self._airway.concerned(writer, body)

@@ -21,7 +21,8 @@ from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimPhase
-from swarm.separation.shared_air import SharedAir, air_of_brief, is_home, strength
+from swarm.separation.fleet_ways import is_home
+from swarm.separation.shared_air import SharedAir, air_of_brief, strength
 from swarm.separation.shifted import length_m
 from swarm.separation.slabs import POSITION_ERROR_M
 from swarm.separation.straight_pieces import thinned

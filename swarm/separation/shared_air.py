@@ -11,25 +11,14 @@ Leaves out: which way is asked for, and when a vehicle departs (agent.core.airwa
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 
-import numpy as np
-
-from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from swarm.separation.fleet_layers import slabs_over
-from swarm.separation.slabs import Path, Slabs, apart, keeper_seats
-
-
-@dataclass(frozen=True, slots=True)
-class Starter:
-    """A UAV of the fleet, as the brief has it."""
-
-    uav: str
-    hovers_enu_m: Point
-    """Where it is as long as it has said nothing else [m; its layer included]."""
+from swarm.separation.fleet_ways import NO_SUCCESSION, FleetWays, Starter, Succession, is_home
+from swarm.separation.slabs import Path, Slabs, apart, keeper_seats, planned_apart_m
 
 
 class SharedAir:
@@ -42,7 +31,8 @@ class SharedAir:
 
     def __init__(self, slabs: Slabs, fleet: Sequence[Starter]) -> None:
         self.slabs = slabs
-        self._uavs = [starter.uav for starter in fleet]
+        self._ways = FleetWays(fleet, planned_apart_m(slabs.separation_m))
+        self._uavs = self._ways.uavs
         self._stacks = slabs.stacks
         rows = keeper_seats(len(self._stacks), len(fleet), level=slabs.level)
         self._first = [self._uavs[row] for each in rows for row in each]
@@ -52,12 +42,8 @@ class SharedAir:
             [seat for seat, its in enumerate(self._stack_of) if its == stack]
             for stack in range(len(rows))
         ]
-        self._unsaid = {
-            starter.uav: ClaimedWay(0, (starter.hovers_enu_m,), flies=True) for starter in fleet
-        }
-        self._paths: dict[str, tuple[ClaimedWay, Path]] = {}
-        self._lined_up: Mapping[str, Claim] | None = None
-        """By whose claims seats were looked at last."""
+        self._lined_up: Mapping[str, Succession] | None = None
+        """By whose words seats were looked at last."""
         self._lined_up_but: Collection[str] = ()
         """And who was not in the air then."""
         self._lines_now: Sequence[Sequence[str | None]] = ()
@@ -66,16 +52,11 @@ class SharedAir:
 
     def way(self, uav: str, claims: Mapping[str, Claim]) -> ClaimedWay:
         """What air ``uav`` takes or asks for, by its last word."""
-        claim = claims.get(uav)
-        return self._unsaid[uav] if claim is None or claim.way is None else claim.way
+        return self._ways.way(uav, claims)
 
     def wanted(self, uav: str, way: ClaimedWay) -> Path:
         """(k, 3) all that ``way`` leads through [m]; k may be 0."""
-        known = self._paths.get(uav)
-        if known is None or known[0] is not way:
-            path = np.array(way.path_enu_m, dtype=np.float64).reshape(-1, 3)
-            known = self._paths[uav] = way, path
-        return known[1]
+        return self._ways.wanted(uav, way)
 
     def taken(self, uav: str, way: ClaimedWay, *, granted: bool) -> Path:
         """(k, 3) where ``uav`` may be [m]: on its way, or where that begins."""
@@ -95,7 +76,7 @@ class SharedAir:
     ) -> bool:
         """Whether ``uav`` would meet nobody there, not even who only asks."""
         asked = self.slabs.asked(path, grounded=grounded)
-        for other in self._uavs:
+        for other in self._ways.near(path, claims):
             if other == uav or other in expired:
                 continue
             way = self.way(other, claims)
@@ -116,6 +97,30 @@ class SharedAir:
         lands = claim is not None and claim.phase is ClaimPhase.OUT
         in_the_way = not apart(self.slabs, here, wanted)
         return in_the_way and (lands or apart(self.slabs, there, wanted))
+
+    def concerns(self, uav: str, writer: str, said: Claim, claims: Mapping[str, Claim]) -> bool:
+        """Whether ``uav``, which keeps no air, has to think of what ``writer`` says now.
+
+        Else it is neither granted anything by it, nor asked for air that it takes or asks for, nor
+        does anything change about who keeps what.
+
+        Args:
+            uav: who hears it.
+            writer: of the claim.
+            said: what it claims.
+            claims: newest known of everyone before that.
+        """
+        before, way = claims.get(writer), said.way
+        if before is None or before.way is None or way is None:
+            return True
+        if ClaimPhase.OUT in (before.phase, said.phase) or way.keeps != before.way.keeps:
+            return True
+        if way.grants.get(uav) != before.way.grants.get(uav):
+            return True
+        own = self.way(uav, claims)
+        if way.flies or not self._ways.may_meet(uav, own, writer, way):
+            return False
+        return not apart(self.slabs, self.wanted(uav, own), self.wanted(writer, way))
 
     # -- who keeps it ----------------------------------------------------------------------
 
@@ -138,10 +143,11 @@ class SharedAir:
         self, claims: Mapping[str, Claim], expired: Collection[str]
     ) -> Sequence[Sequence[str | None]]:
         """By seat, all who have sat there, one after the other, up to who does now."""
-        if claims != self._lined_up or set(expired) != self._lined_up_but:
-            self._lined_up, self._lined_up_but = dict(claims), set(expired)
-            told = ((uav, self.way(uav, claims).keeps) for uav in self._uavs)
-            keeping = [(uav, keeps) for uav, keeps in told if keeps and not is_home(claims[uav])]
+        self._ways.look_at(claims)
+        if self._ways.successions != self._lined_up or set(expired) != self._lined_up_but:
+            self._lined_up, self._lined_up_but = dict(self._ways.successions), set(expired)
+            told = ((uav, *self._ways.successions.get(uav, NO_SUCCESSION)) for uav in self._uavs)
+            keeping = [(uav, keeps) for uav, keeps, home, _ in told if keeps and not home]
             self._lines_now = [
                 self._line(
                     first,
@@ -181,7 +187,7 @@ class SharedAir:
                     return [*line, uav]
                 after = self.way(uav, claims).heir
             line.append(uav)
-            if after is None or after in line or after not in self._unsaid:
+            if after is None or after in line or after not in self._ways:
                 here = self._uavs.index(uav)
                 order = [*self._uavs[here + 1 :], *self._uavs[:here]]
                 after = next((each for each in order if each not in line), None)
@@ -254,7 +260,7 @@ class SharedAir:
             )
         granted = self.way(keeper, claims).grants
         return all(
-            uav in expired or uav not in self._unsaid or self.way(uav, claims).number >= number
+            uav in expired or uav not in self._ways or self.way(uav, claims).number >= number
             for uav, number in granted.items()
         )
 
@@ -268,23 +274,25 @@ class SharedAir:
         """Whether requests that ``keeper`` has granted, and that wait, meet nobody in slabs."""
         grants = self._binding(keeper, claims, expired)
         for uav, number in self.way(keeper, claims).grants.items():
-            way = None if uav not in self._unsaid else self.way(uav, claims)
+            way = None if uav not in self._ways else self.way(uav, claims)
             if way is None or way.flies or way.number != number or uav in expired:
                 continue
             path = self.wanted(uav, way)
-            others = self._taken_by_others(uav, claims, grants, expired)
+            others = self._taken_near(path, uav, claims, grants, expired)
             if not all(apart(self.slabs, path, other, within) for other in others):
                 return False
         return True
 
-    def _taken_by_others(
+    def _taken_near(
         self,
+        path: Path,
         uav: str,
         claims: Mapping[str, Claim],
         grants: Sequence[Mapping[str, int]],
         expired: Collection[str],
     ) -> Iterator[Path]:
-        for other in self._uavs:
+        """What others take of the air near ``path``, which ``uav`` asks for."""
+        for other in self._ways.near(path, claims):
             if other != uav and other not in expired:
                 way = self.way(other, claims)
                 granted = any(each.get(other) == way.number for each in grants)
@@ -322,14 +330,15 @@ class SharedAir:
         grants = {
             uav: number
             for uav, number in own.grants.items()
-            if uav in self._unsaid and self.way(uav, claims).number <= number
+            if uav in self._ways and self.way(uav, claims).number <= number
         }
         if any(self.way(uav, claims).number < number for uav, number in grants.items()):
             return grants  # an earlier life has granted what this one has not heard of
-        mine, needed = self._sits_in(keeper, claims, heard, expired)
+        mine, needed = self._sits_in(keeper, claims, heard, self._lines(claims, expired))
         binding = [grants, *self._binding(keeper, claims, expired)]
         waiting: list[Path] = []
-        for uav in sorted(self._asking(claims), key=lambda each: strength(each, claims)):
+        self._ways.look_at(claims)
+        for uav in sorted(self._ways.asking, key=lambda each: strength(each, claims)):
             way = self.way(uav, claims)
             if uav not in heard or uav in expired or grants.get(uav) == way.number:
                 continue
@@ -337,7 +346,7 @@ class SharedAir:
             asked = self.slabs.asked(path, grounded=way.grounded)
             if not asked & needed:
                 continue
-            others = self._taken_by_others(uav, claims, binding, expired)
+            others = self._taken_near(path, uav, claims, binding, expired)
             before_it = (
                 other
                 for other in waiting
@@ -354,7 +363,7 @@ class SharedAir:
         keeper: str,
         claims: Mapping[str, Claim],
         heard: Collection[str],
-        expired: Collection[str],
+        lines: Sequence[Sequence[str | None]],
     ) -> tuple[frozenset[int], frozenset[int]]:
         """Slabs in which ``keeper`` has a seat, and those in which its grant is needed as well.
 
@@ -362,7 +371,7 @@ class SharedAir:
         """
         mine, needed = set[int](), set[int]()
         for stack, seats in zip(self._stacks, self._seats, strict=True):
-            sitting = [self._sitting(seat, claims, expired) for seat in seats]
+            sitting = [self._sitting(seat, claims, lines) for seat in seats]
             if keeper in sitting:
                 mine |= stack
                 first = sitting[: _majority(len(seats))]
@@ -371,16 +380,13 @@ class SharedAir:
         return frozenset(mine), frozenset(needed)
 
     def _sitting(
-        self, seat: int, claims: Mapping[str, Claim], expired: Collection[str]
+        self, seat: int, claims: Mapping[str, Claim], lines: Sequence[Sequence[str | None]]
     ) -> str | None:
         """Whose grants count for that seat: an heir's once it says that it has taken over."""
-        holder = self.holder(seat, claims, expired)
+        holder = lines[seat][-1]
         if holder is None or holder == self._first[seat]:
             return holder
         return holder if seat in self.way(holder, claims).keeps else None
-
-    def _asking(self, claims: Mapping[str, Claim]) -> list[str]:
-        return [uav for uav in self._uavs if not self.way(uav, claims).flies]
 
     def is_granted(self, uav: str, claims: Mapping[str, Claim], expired: Collection[str]) -> bool:
         """Whether enough of those who keep the air of ``uav``'s request have granted it.
@@ -390,12 +396,12 @@ class SharedAir:
             claims: newest known of everyone, its own as it is about to be said.
             expired: who is not in the air any more.
         """
-        way = self.way(uav, claims)
+        way, lines = self.way(uav, claims), self._lines(claims, expired)
         path = self.wanted(uav, way)
         for seats in self._asked_seats(self.slabs.asked(path, grounded=way.grounded)):
             grants = 0
             for seat in seats:
-                keeper = self._sitting(seat, claims, expired)
+                keeper = self._sitting(seat, claims, lines)
                 granted = keeper is not None and self.way(keeper, claims).grants.get(uav)
                 grants += granted == way.number
             if grants < _majority(len(seats)):
@@ -408,8 +414,9 @@ class SharedAir:
         """Who asks for a way that meets ``uav`` where it is, the strongest first."""
         found = [
             other
-            for other in self._asking(claims)
+            for other in self._ways.near(here, claims)
             if other != uav
+            and other in self._ways.asking
             and other not in expired
             and not apart(self.slabs, here, self.wanted(other, self.way(other, claims)))
         ]
@@ -428,23 +435,29 @@ def _majority(seats: int) -> int:
     return seats // 2 + 1
 
 
-def is_home(claim: Claim | None) -> bool:
-    """Whether it takes no part any more, and stands on the ground."""
-    return (
-        claim is not None
-        and claim.phase is ClaimPhase.OUT
-        and claim.way is not None
-        and not claim.way.path_enu_m
-    )
+_recent: deque[tuple[MissionConfig, SharedAir]] = deque(maxlen=2)
+"""In a simulation all of a fleet have the same brief, and see the same air."""
 
 
 def air_of_brief(brief: MissionConfig) -> SharedAir | None:
-    """The air of the mission that ``brief`` tells of; None if nobody keeps apart there."""
+    """The air of the mission that ``brief`` tells of; None if nobody keeps apart there.
+
+    Of the very same brief it is the same air: all that it remembers is what was worked out.
+    """
     if brief.separation_m is None or not brief.uavs:
         return None
+    for known, air in tuple(_recent):
+        if known is brief:
+            return air
+    air = _air_of(brief, brief.separation_m)
+    _recent.append((brief, air))
+    return air
+
+
+def _air_of(brief: MissionConfig, separation_m: float) -> SharedAir:
     lowest_m = min(uav.layer_m for uav in brief.uavs)
     terrain = None if brief.terrain is None else brief.terrain.terrain()
-    slabs = slabs_over(terrain, brief.separation_m, len(brief.uavs), brief.band_m, lowest_m)
+    slabs = slabs_over(terrain, separation_m, len(brief.uavs), brief.band_m, lowest_m)
     fleet = []
     for uav in brief.uavs:
         east_m, north_m, up_m = uav.position_enu_m

@@ -8,10 +8,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from agent.core.agent_core import AgentCore
+from agent.core.interface import Action, Event
 from sim.faults.case import quick_plan
 from sim.world.simulation import SimulatedMission, simulate_mission
 from sim.world.uncertainty import Uncertainty
 from swarm.model import Mission, Task, TaskId, Uav, UavId
+from swarm.protocol.events import Publish
+from swarm.protocol.uav_messages import Claim
 
 NIGHT = pytest.mark.slow
 FOUR = [(0.0, 0.0), (100.0, 0.0), (0.0, 100.0), (100.0, 100.0)]
@@ -87,3 +91,26 @@ def test_without_a_separation_they_pass_in_their_own_layers() -> None:
 
     assert nearest_m is not None
     assert nearest_m < 10.0
+
+
+class SaysOnce(AgentCore):
+    """Fails if it says in one step what it claims, and then something else."""
+
+    def step(self, event: Event, now_s: float) -> list[Action]:
+        actions = super().step(event, now_s)
+        said = [action.message.body for action in actions if isinstance(action, Publish)]
+        assert sum(isinstance(body, Claim) for body in said) <= 1
+        return actions
+
+
+def test_a_claim_and_the_way_that_it_asks_for_are_one_word() -> None:
+    flown = simulate_mission(
+        crossing(2),
+        method="greedy",
+        seed=1,
+        uncertainty=Uncertainty(),
+        planner=quick_plan,
+        make_agent=SaysOnce,
+    )
+
+    assert sorted(flown.result.done) == ["t0", "t1", "t2", "t3"]

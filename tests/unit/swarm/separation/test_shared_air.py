@@ -9,7 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
-from swarm.separation.shared_air import SharedAir, Starter
+from swarm.separation.fleet_ways import Starter
+from swarm.separation.shared_air import SharedAir
 from swarm.separation.slabs import Slabs, apart
 
 SLABS = Slabs.between(10.0, (30.0, 42.0))
