@@ -89,6 +89,8 @@ class RequestHandler(ABC, Generic[Wish, Statement]):
     def __init__(self, wish: Wish, mission_state: MissionState, patience_s: float) -> None:
         self.known_to: set[str] = set()
         """Who has confirmed that it knows what was said."""
+        self.all_shown = False
+        """Whether everyone who is there has had the time to show its token."""
         self._wish = wish
         self._mission_state = mission_state
         self._patience_s = patience_s
@@ -139,10 +141,14 @@ class RequestHandler(ABC, Generic[Wish, Statement]):
 
     @property
     def _expected(self) -> set[str]:
-        """Who is there and takes part, and so ought to know of what concerns everybody."""
+        """Who is there and takes part, and so ought to know of what concerns everybody.
+
+        Who takes part and has not been seen may just not have shown its token yet.
+        """
         claims = self._mission_state.replica.claims.items()
         out = {uav for uav, claim in claims if claim.phase is ClaimPhase.OUT}
-        return ({*self._fleet} - out | {COORDINATOR}) & self._mission_state.present
+        taking_part = {*self._fleet} - out | {COORDINATOR}
+        return taking_part & self._mission_state.present if self.all_shown else taking_part
 
     @property
     def _is_over(self) -> bool:

@@ -37,7 +37,15 @@ from coordinator.operator.readiness import ReadyHandler, ReadyRequest
 from coordinator.operator.task_edits import NewTask, TaskEditHandler, TaskWithdrawal
 from coordinator.operator.zone_edits import NewZone, ZoneEditHandler, ZoneRemoval
 from swarm.model.ids import OPERATOR
-from swarm.protocol.events import Ask, CommonAction, CommonEvent, Finish, Publish, SnapshotsReceived
+from swarm.protocol.events import (
+    Ask,
+    CommonAction,
+    CommonEvent,
+    Finish,
+    LinkChanged,
+    Publish,
+    SnapshotsReceived,
+)
 from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.messages import Message, OperatorCommand, StartWithout, TaskEdit
 from swarm.protocol.register_writer import RegisterWriter
@@ -96,6 +104,9 @@ class RequestTracker:
         self._register_writer = RegisterWriter(mission_state.mission.name, OPERATOR, incarnation)
         self._timing = timing
         self._patience_s = patience_s
+        self._shown_at_s: float | None = None
+        """By then everyone who is there has shown its token since the own link came up."""
+        self._all_shown = False
 
     def give(self, wish: OperatorRequest, now_s: float) -> TrackedRequest:
         """Say what the operator wants, from the next step on; with a verdict if it cannot."""
@@ -133,7 +144,11 @@ class RequestTracker:
         """Follow what has been given; call it after the observer has taken note of ``fact``."""
         wishes: list[CommonAction] = []
         asks = False
+        if self._shown_at_s is None or (isinstance(fact, LinkChanged) and fact.up):
+            self._shown_at_s = now_s + self._timing.relink_grace_s
+        self._all_shown = self._shown_at_s <= now_s
         for request in self.open:
+            request.handler.all_shown = self._all_shown
             said = self._said_for_this_run(request, now_s)
             if said is None:
                 continue
@@ -174,6 +189,8 @@ class RequestTracker:
         deadlines = [
             min(request.leave_at_s, request.again_at_s, request.ask_at_s) for request in self.open
         ]
+        if self.open and self._shown_at_s is not None and not self._all_shown:
+            deadlines.append(self._shown_at_s)
         looks = (request.handler.next_deadline_s() for request in self.open)
         return min([*deadlines, *(at_s for at_s in looks if at_s is not None)], default=None)
 

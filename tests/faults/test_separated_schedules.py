@@ -27,6 +27,7 @@ BROKEN_ONCE = {
     3100409: "a vehicle told an agent that heard nobody nothing of its battery, and fell",
     3100594: "who left a task for another layer still went by its own, and fell on the way",
     3100739: "who was held before it took off had let others have the air above its start",
+    3010690: "an operator left whom only those had confirmed whose tokens had come up by then",
     3010313: "a line under a new zone was flown by one whose battery has no end",
 }
 

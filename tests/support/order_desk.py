@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.operator.commands import RequestResult
 from coordinator.operator.requests import OperatorRequest, RequestTracker, TrackedRequest
@@ -26,22 +28,36 @@ FLEET = [uav("u0", lift=0.0), uav("u1", lift=0.0)]
 
 
 class Desk:
-    """An operator's requests beside ``u0`` and ``u1``, whom the test plays."""
+    """An operator's requests beside ``u0`` and ``u1``, whom the test plays.
 
-    def __init__(self, flown: Mission | None = None) -> None:
+    Args:
+        flown: the mission, if it is not that of `FLEET`.
+        seen: whose tokens have been seen.
+        looked_for_s: how long the operator has been there at 0 s.
+    """
+
+    def __init__(
+        self,
+        flown: Mission | None = None,
+        *,
+        seen: Sequence[str] = ("u0", "u1"),
+        looked_for_s: float = TIMING.relink_grace_s,
+    ) -> None:
         self.mission_state = MissionState(flown or mission(FLEET, []), TIMING)
         self.errands = RequestTracker(
             self.mission_state, incarnation=50, timing=TIMING, patience_s=PATIENCE_S
         )
-        self.now_s = 0.0
+        self.now_s = -looked_for_s
         self.wishes: list[CommonAction] = []
         self._counter = 0
         self.hear(COORDINATOR, brief(*FLEET))
         self.hear(COORDINATOR, entry("t0", value=2.0), entry("t1", number=4, value=6.0))
         self.hear(COORDINATOR, epoch("u0", "u1"))
         for writer in ("u0", "u1"):
-            self.happen(PeerSeen(writer))
+            if writer in seen:
+                self.happen(PeerSeen(writer))
             self.hear(writer, IDLE)
+        self.now_s = 0.0
         self.wishes.clear()
 
     def hear(self, writer: str, *bodies: Body) -> None:

@@ -12,7 +12,7 @@ from coordinator.operator.zone_edits import NewZone, UnsoundZoneError, ZoneRemov
 from swarm.model.frames import DEFAULT_ORIGIN, wgs84_from_enu
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.encoding import SMALL_LIMIT_BYTES, encode
-from swarm.protocol.events import PeerGone, Tick
+from swarm.protocol.events import LinkChanged, PeerGone, PeerSeen, Tick
 from swarm.protocol.field_messages import BaseSpec, UavReady, ZoneEdit, ZoneSpec
 from swarm.protocol.messages import MissionPhase
 from swarm.protocol.operator_commands import NOT_READY, zones_in_force
@@ -65,6 +65,42 @@ def test_who_has_not_confirmed_a_zone_in_time_is_named() -> None:
     unheard = desk.give(NewZone("y", SQUARE))
     desk.wait(2.0 * PATIENCE_S)
     assert came(unheard)[0] is RequestResult.NOT_OBEYED
+
+
+def test_who_has_not_shown_its_token_yet_is_waited_for() -> None:
+    desk = Desk(seen=("u0",), looked_for_s=0.5)
+    tracked = desk.give(DRAWN)
+    desk.confirm(tracked, "u0", COORDINATOR)
+    assert tracked.verdict is None, "u1 may be there"
+
+    desk.happen(PeerSeen("u1"), 0.2)
+    desk.confirm(tracked, "u0")
+    assert tracked.verdict is None
+    desk.confirm(tracked, "u1")
+    assert came(tracked) == (RequestResult.OBEYED, "zone z is drawn")
+
+
+def test_who_does_not_show_its_token_in_time_is_not_there() -> None:
+    desk = Desk(seen=("u0",), looked_for_s=0.5)
+    tracked = desk.give(DRAWN)
+    desk.confirm(tracked, "u0")
+    shown_s = TIMING.relink_grace_s - 0.5
+    desk.wait(shown_s - 0.01)
+    assert tracked.verdict is None
+
+    desk.wait(shown_s)
+    assert came(tracked) == (RequestResult.OBEYED, "zone z is drawn")
+
+
+def test_after_the_own_link_was_down_everybody_may_have_to_be_seen_anew() -> None:
+    desk = Desk(seen=("u0",))
+    desk.happen(LinkChanged(up=False), 5.0)
+    desk.happen(LinkChanged(up=True), 6.0)
+    tracked = desk.give(DRAWN)
+    desk.confirm(tracked, "u0")
+    assert tracked.verdict is None
+    desk.wait(6.0 + TIMING.relink_grace_s)
+    assert came(tracked)[0] is RequestResult.OBEYED
 
 
 def test_a_zone_is_taken_away_that_was_drawn_or_that_the_scenario_has() -> None:
