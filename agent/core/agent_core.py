@@ -361,8 +361,9 @@ class AgentCore(AgentPart):
 
     @property
     def _is_beginning(self) -> bool:
-        """Whether it knows enough, and has not acted on it yet."""
-        return self.state is AgentState.SYNCING and self._queries.current
+        """Whether it knows enough, what time it is too, and has not acted on it yet."""
+        syncs = self.state is AgentState.SYNCING and self._queries.current
+        return syncs and not self._recovered.waits_for_time(self._mission_view)
 
     # -- the beginning of a life ------------------------------------------------------
 

@@ -10,6 +10,7 @@ import math
 from collections.abc import Collection, Iterable
 
 from agent.core.interface import Action
+from agent.core.mission_view import MissionView
 from swarm.protocol.events import Publish
 from swarm.protocol.messages import MissionConfig, MissionPhase, Snapshot
 from swarm.protocol.registers import Replica, snapshot_without
@@ -71,6 +72,15 @@ class RecoveredState:
         if self.unconfirmed or (self._took_part and (self._fresh or last_chance)):
             return self._take(True)
         return None
+
+    def waits_for_time(self, mission_view: MissionView) -> bool:
+        """Whether the mission runs, nobody has told at what time, and somebody may yet.
+
+        Its answer may have been lost. Without the time no claim of an earlier life can be kept.
+        """
+        until_s = self._began_s + self._patience_s
+        lacks = mission_view.said_to_run and not mission_view.clock.is_set
+        return lacks and mission_view.now_s < until_s
 
     def next_deadline_s(self) -> float | None:
         """When an old memory will count for want of a better one."""

@@ -96,6 +96,32 @@ def test_it_stands_by_its_claim_at_once_and_flies_on_to_its_task(from_peers: boo
     assert agent.task == "far"
 
 
+def test_it_keeps_its_claim_though_nobody_has_told_the_time_at_first() -> None:
+    """As when answers are lost; without the time it does not know whether the claim counts."""
+    earlier = crashed()
+    agent = earlier.reborn(remembers=False)
+    agent.see(COORDINATOR)
+    actions = agent.learn(*earlier.core.memory(agent.now_s).messages)
+    assert orders(actions) == registers(actions) == []
+    assert any(isinstance(action, Ask) for action in agent.run_until(8.0))
+
+    actions = agent.learn(mission_s=8.0)
+    assert orders(actions) == [LEFT]
+    assert set(claims(actions)) == {HELD}
+
+
+def test_it_begins_without_the_time_when_nobody_has_told_it_for_long() -> None:
+    earlier = crashed()
+    agent = earlier.reborn()
+    agent.see(COORDINATOR)
+    agent.learn(*earlier.core.memory(agent.now_s).messages)
+    agent.run_until(6.0 + agent.timing.abandon_s - 1.0)
+    assert agent.core.phase is StatusPhase.LEARNING
+
+    agent.run_until(6.0 + agent.timing.abandon_s + 1.0)
+    assert agent.core.phase is not StatusPhase.LEARNING
+
+
 def test_everything_it_says_is_newer_than_what_others_remember() -> None:
     earlier = crashed()
     agent = earlier.reborn()
