@@ -124,8 +124,21 @@ class StateSync(AgentPart):
             self._tasking.consider_diversion("" if claim is None else claim.task or "")
         self._left_by.clear()
         self._ask_for_last_words(now_s)
+        if self._lacks_epoch:
+            self.queries.doubt(now_s, {COORDINATOR})
         if self.queries.current:
             self._insist(now_s)
+
+    @property
+    def _lacks_epoch(self) -> bool:
+        """Whether an earlier life has taken something, and who could say in what has not answered.
+
+        Others leave it to the coordinator to tell the epoch. To begin anew would be to leave that.
+        """
+        claim = self._replica.claims.get(self._uav)
+        taken = claim is not None and claim.is_taken
+        unheard = COORDINATOR in self._peers.membership.present - self._answered
+        return taken and unheard and self._replica.epoch is None and not self._machine.acts
 
     def _ask_for_last_words(self, now_s: float) -> None:
         """Ask again what those who were lost have said at last.

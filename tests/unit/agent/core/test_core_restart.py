@@ -72,6 +72,25 @@ def registers(actions: list[Action]) -> list[Message]:
     return [message for message in published if not isinstance(message.body, Status)]
 
 
+def test_it_does_not_leave_its_task_for_want_of_the_coordinators_answer() -> None:
+    """Others know the task that it had, and leave it to the coordinator to say that it is time."""
+    earlier = crashed(others=1)
+    agent = earlier.reborn()
+    agent.see(COORDINATOR, "u1")
+    known = agent.core.replica
+    brief, claim = agent.statement(COORDINATOR, agent.brief), earlier.core.replica.claims["u0"]
+    remembered = message("u0", claim, counter=70, incarnation=5)
+    answer = Snapshot(MISSION, "u1", 1, 6.0, (brief, remembered))
+
+    actions = agent.happen(SnapshotsReceived((answer,)))
+
+    assert known.claims["u0"] == HELD
+    assert orders(actions) == []
+    actions = agent.learn_what_was_known_to(earlier)
+    assert orders(actions) == [LEFT]
+    assert agent.task == "near"
+
+
 # -- going on ---------------------------------------------------------------------------
 
 
