@@ -10,7 +10,7 @@ unexport PYTHONDONTWRITEBYTECODE
 KERNELS := $(wildcard swarm/kernels/*.cpp swarm/kernels/*.hpp) swarm/kernels/CMakeLists.txt
 
 .PHONY: demo test test-all test-computed test-processes browser lint audit format kernels sanitize soak chaos fuzz clean help
-.PHONY: dist check-dist sbom wheels check-units check-machines
+.PHONY: dist check-dist sbom wheels check-units check-machines check-image
 
 help:
 	@echo "make demo    fly the paper's mission with real processes on this machine"
@@ -30,6 +30,7 @@ help:
 	@echo "make wheels  wheels for all machines, into dist/wheels/; needs Docker or Podman"
 	@echo "make check-units  boot systemd in a container, and kill and freeze the services of a fleet (root)"
 	@echo "make check-machines  fly a fleet on two network namespaces, and pull the cable between them (root)"
+	@echo "make check-image  build the images, fly in them, compose fleets (Docker or Podman; says what was not tried)"
 	@echo "make clean   remove what was built and installed here"
 
 demo: $(VENV)/.installed
@@ -167,6 +168,9 @@ check-units: $(VENV)/.installed-dev
 
 check-machines: $(VENV)/.installed-dev
 	deploy/checks/machines.sh
+
+check-image: $(VENV)/.installed-dev
+	deploy/checks/image.sh
 
 clean:
 	rm -rf $(VENV) build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache .hypothesis

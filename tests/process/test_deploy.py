@@ -15,6 +15,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import tomllib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -333,6 +334,20 @@ def test_image_has_no_build_tools_and_runs_as_nobody() -> None:
     ]
     assert [said for word, said in final if word == "USER"] == ["10001:10001"]
     assert json.loads(dict(final)["ENTRYPOINT"]) == ["swarm"]
+
+
+def test_image_is_built_from_all_that_a_wheel_is_made_of() -> None:
+    project = tomllib.loads((DEPLOY.parent / "pyproject.toml").read_text())
+    copied = {
+        source for word, said in stages()["build"] if word == "COPY" for source in said.split()[:-1]
+    }
+
+    assert copied == {
+        "pyproject.toml",
+        project["project"]["readme"],
+        *project["project"]["license-files"],
+        *project["tool"]["scikit-build"]["wheel"]["packages"],
+    }
 
 
 def test_image_to_try_flies_a_fleet_and_is_asked_whether_its_dashboard_lives() -> None:
