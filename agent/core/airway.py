@@ -453,8 +453,7 @@ class Airway:
             if wish is not self._aside:
                 self._wish = None
             elif self._wish is not None:
-                end = self._told_way.path_enu_m[-1]
-                self._fleet.begin_at(self._wish, self._nominal(end))
+                self._fleet.begin_at(self._wish, self._nominal(self._told_way.path_enu_m[-1]))
             self._aside = None
 
     def _depart(self, wish: Wish) -> None:
@@ -462,8 +461,7 @@ class Airway:
         way, order, path = self._told_way, wish.order, self._told_way.path_enu_m
         self._left_base |= self._stands_at is not None
         self._moves, self._aloft = len(path) > 1, True
-        self._stands_at = self._lifts_enu_m = None
-        self._own_height = wish.own_height
+        self._stands_at, self._lifts_enu_m, self._own_height = None, None, wish.own_height
         self._way = replace(way, flies=True, grounded=False)
         if wish.is_shorter_than(path):
             self.when_detoured()
