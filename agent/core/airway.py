@@ -42,7 +42,7 @@ from swarm.protocol.fields import Point
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimedWay, ClaimPhase
-from swarm.separation.shared_air import SharedAir, strength
+from swarm.separation.shared_air import SharedAir, adds_nothing, strength
 from swarm.separation.shifted import hovering, landed, left_of_way, lifted, nominal, shifted_path
 from swarm.separation.slabs import apart
 from swarm.separation.straight_pieces import not_flown
@@ -305,7 +305,7 @@ class Airway:
         left = self._left_base and claim.task is not None and claim.departs_s is not None
         now = self.told(replace(claim, base=None, stage=None, departs_s=None) if left else claim)
         self._left_base = False
-        if now.way == claim.way and (now.base, now.stage) == (claim.base, claim.stage):
+        if adds_nothing(now.way, claim.way) and (now.base, now.stage) == (claim.base, claim.stage):
             return None
         return now
 

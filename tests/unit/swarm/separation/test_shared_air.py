@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from swarm.separation.fleet_ways import Starter
-from swarm.separation.shared_air import SharedAir
+from swarm.separation.shared_air import SharedAir, adds_nothing
 from swarm.separation.slabs import Slabs, apart
 
 SLABS = Slabs.between(10.0, (30.0, 42.0))
@@ -349,3 +349,32 @@ def test_ways_that_are_flown_never_meet_whatever_each_keeper_has_heard(
     for _ in range(120):
         sky.act()
         sky.check()
+
+
+def test_grants_that_are_left_out_can_wait_for_the_next_word_and_nothing_else_can() -> None:
+    said = ClaimedWay(1, ((0.0, 0.0, 30.0),), flies=True, grants={"u1": 1, "u2": 2})
+
+    assert adds_nothing(said, said)
+    assert adds_nothing(replace(said), said)
+    assert adds_nothing(replace(said, grants={"u2": 2}), said)
+    assert adds_nothing(None, None)
+    for more in (
+        replace(said, grants={"u1": 1, "u2": 3}),
+        replace(said, grants={"u0": 1}),
+        replace(said, grants={"u2": 2}, number=2),
+        replace(said, flies=False),
+        replace(said, keeps=(0,)),
+        None,
+    ):
+        assert not adds_nothing(more, said)
+
+
+def test_a_grant_of_a_request_that_is_over_lets_nobody_go_and_keeps_nobody_back() -> None:
+    there, back = (200.0, 0.0, 30.0), (200.0, 50.0, 30.0)
+    claims = {"u0": hovers(FLEET[0], u2=1), "u2": claim(asks(2, there, back))}
+    over = {"u0": hovers(FLEET[0]), "u2": claim(asks(2, there, back))}
+
+    assert not ALONE.is_granted("u2", claims, ())
+    for keeper in ALL:
+        now = ALONE.granted(keeper, claims, ALL, ())
+        assert now == ALONE.granted(keeper, over, ALL, ())
