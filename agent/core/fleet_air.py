@@ -21,11 +21,11 @@ from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimPhase
-from swarm.separation.fleet_ways import is_home
 from swarm.separation.shared_air import SharedAir, air_of_brief, strength
 from swarm.separation.shifted import length_m
 from swarm.separation.slabs import POSITION_ERROR_M
 from swarm.separation.straight_pieces import thinned
+from swarm.separation.taken_ways import is_home
 
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end, or is changed [s]."""

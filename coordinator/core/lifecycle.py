@@ -411,9 +411,10 @@ class MissionEndCondition:
         field = self._board.field_problem
         if field is None:
             return anything_doable(self._board, present)
-        from swarm.protocol.field_board import doable_in_field  # plain missions never load it
+        # Plain missions never load it.
+        from swarm.protocol.field_board import anything_doable_in_field
 
-        return bool(present) and bool(doable_in_field(field, self._board, present, mission_s))
+        return bool(present) and anything_doable_in_field(field, self._board, present, mission_s)
 
     def _outlook(self, mission_s: float, *, more_to_come: bool) -> tuple[str | None, float]:
         """How the mission will end if nothing changes, and how long that may yet change [s]."""

@@ -215,7 +215,9 @@ def _as_sets(left_out: Mapping[str, tuple[str, ...]]) -> dict[str, frozenset[str
 
 def _happened(before: Situation, now: Situation) -> list[str]:
     """What has happened to fleet, tasks and zones, in words."""
-    tasks, tasks_before = set(now.problem.task_ids), set(before.problem.task_ids)
+    tasks, tasks_before = set[str](), set[str]()
+    if now.problem is not before.problem:
+        tasks, tasks_before = set(now.problem.task_ids), set(before.problem.task_ids)
     changes = {
         "lost": before.taking_part - now.taking_part,
         "back": now.taking_part - before.taking_part,

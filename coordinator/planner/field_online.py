@@ -80,7 +80,8 @@ class FieldStanding:
             sequence=() if board.replica.epoch is None else board.replica.epoch.sequence,
             blocking=blocking(everybody, everybody.keys() - claims.keys()),
         )
-        state.active[:] = [uav in active for uav in problem.uav_ids]
+        taking_part = frozenset(active)
+        state.active[:] = [uav in taking_part for uav in problem.uav_ids]
         np.maximum(state.free_s, mission_s, out=state.free_s)
         return cls(problem, state)
 

@@ -21,6 +21,7 @@ import numpy as np
 from coordinator.planner.options import ShouldStop, after_evaluations, first_of, never, part_of
 from coordinator.planner.plan import guided_plan
 from coordinator.planner.sequence_search import search_sequence
+from coordinator.planner.visits import Visits
 from swarm.allocation.lower_level import TeamState, run
 from swarm.allocation.objective import evaluate
 from swarm.allocation.problem import Problem
@@ -39,7 +40,7 @@ from swarm.protocol.calibration import FlightRates
 from swarm.protocol.field_messages import ZoneSpec
 from swarm.protocol.messages import PlanEpoch
 from swarm.protocol.operator_commands import zones_in_force
-from swarm.protocol.uav_messages import AttemptResult, ClaimPhase, Outcome
+from swarm.protocol.uav_messages import AttemptResult, ClaimPhase
 
 if TYPE_CHECKING:
     from coordinator.planner.field_online import FieldCourse, FieldStanding
@@ -123,7 +124,7 @@ class Situation:
             problem,
             state,
             mission_s,
-            _visited(replica.outcomes, states),
+            Visits(replica.outcomes, states),
             under_way,
             frozenset(task for task, what in states.items() if what is TaskState.WITHDRAWN),
             sum(outcome.result is AttemptResult.FAILED for outcome in replica.outcomes.values()),
@@ -149,8 +150,9 @@ class Situation:
         """Nothing is left that a plan could decide."""
         if self.field is not None:
             return self.field.is_settled
-        capable = self.problem.capable[self.state.active][:, self.state.open]
-        return not bool(capable.any())
+        capable, open_ = self.problem.capable, self.state.open
+        rows = np.flatnonzero(self.state.active)
+        return not any((capable[row] & open_).any() for row in rows)  # mostly the first one can
 
 
 @dataclass(frozen=True, slots=True)
@@ -468,18 +470,6 @@ def _ended_by_lists(
             state.open[task] = False
     rest = guided_plan(problem, stop=lambda _: True, state=state, lists=_by_index(problem, routes))
     return [[*route, *more] for route, more in zip(begun, rest.routes, strict=True)]
-
-
-def _visited(
-    outcomes: Mapping[tuple[str, str], Outcome], states: Mapping[str, TaskState]
-) -> dict[str, tuple[str, ...]]:
-    visited: dict[str, list[str]] = {}
-    seen: set[str] = set()
-    for (uav, task), _ in sorted(outcomes.items(), key=lambda item: (item[1].completed_s, item[0])):
-        if task not in seen and states.get(task, TaskState.OPEN) is not TaskState.OPEN:
-            seen.add(task)
-            visited.setdefault(uav, []).append(task)
-    return {uav: tuple(tasks) for uav, tasks in visited.items()}
 
 
 def _by_id(problem: Problem, lists: Sequence[Sequence[int]]) -> Lists:

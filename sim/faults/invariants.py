@@ -58,7 +58,7 @@ from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoc
 from swarm.protocol.operator_commands import abort_command, newest_command, zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, StatusPhase
-from swarm.separation.fleet_ways import is_home
+from swarm.separation.taken_ways import is_home
 
 SETTLED_S = 5.0
 """Calm for this long, the fleet must agree."""

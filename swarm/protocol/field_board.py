@@ -107,6 +107,26 @@ def last_node(problem: field.FieldProblem, board: TaskBoard, uav: str) -> int:
     return field.task_nodes(problem, ended[1], backwards=ended[2])[1]
 
 
+def anything_doable_in_field(
+    problem: field.FieldProblem, board: TaskBoard, present: Collection[str], mission_s: float
+) -> bool:
+    """Whether there is any of `doable_in_field`; mostly somebody is on its way to one."""
+    claims, states = _taking_part(board, present), board.states
+    under_way = holders(claims).keys() & set(problem.task_ids)
+    if any(states.get(task) is TaskState.OPEN for task in under_way):
+        return True
+    return bool(doable_in_field(problem, board, present, mission_s))
+
+
+def _taking_part(board: TaskBoard, present: Collection[str]) -> dict[str, Claim]:
+    """Claims of those who are there and have not left."""
+    return {
+        uav: claim
+        for uav, claim in board.replica.claims.items()
+        if uav in present and claim.phase is not ClaimPhase.OUT
+    }
+
+
 def doable_in_field(
     problem: field.FieldProblem, board: TaskBoard, present: Collection[str], mission_s: float
 ) -> list[str]:
@@ -120,11 +140,7 @@ def doable_in_field(
         present: the writers believed alive; the lost take no part.
         mission_s: now [s mission time]: nobody departs before, but who has just ended a task.
     """
-    claims = {
-        uav: claim
-        for uav, claim in board.replica.claims.items()
-        if uav in present and claim.phase is not ClaimPhase.OUT
-    }
+    claims = _taking_part(board, present)
     claimed = holders(claims)
     counting = {
         uav: claim

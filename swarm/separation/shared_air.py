@@ -18,8 +18,8 @@ from dataclasses import replace
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from swarm.separation.fleet_layers import slabs_over
-from swarm.separation.fleet_ways import NO_SUCCESSION, FleetWays, Starter, Succession, is_home
 from swarm.separation.slabs import Path, Slabs, apart, keeper_seats, planned_apart_m
+from swarm.separation.taken_ways import NO_SUCCESSION, Starter, Succession, TakenWays, is_home
 
 
 class SharedAir:
@@ -32,7 +32,7 @@ class SharedAir:
 
     def __init__(self, slabs: Slabs, fleet: Sequence[Starter]) -> None:
         self.slabs = slabs
-        self._ways = FleetWays(fleet, planned_apart_m(slabs.separation_m))
+        self._ways = TakenWays(fleet, planned_apart_m(slabs.separation_m))
         self._uavs = self._ways.uavs
         self._stacks = slabs.stacks
         rows = keeper_seats(len(self._stacks), len(fleet), level=slabs.level)

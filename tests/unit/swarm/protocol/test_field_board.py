@@ -13,7 +13,11 @@ from swarm.kernels.field import FIELD_GREEDY
 from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.board import TaskBoard
-from swarm.protocol.field_board import doable_in_field, field_state
+from swarm.protocol.field_board import (
+    anything_doable_in_field,
+    doable_in_field,
+    field_state,
+)
 from swarm.protocol.messages import Body
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, BaseStage, Claim, ClaimPhase, Outcome
@@ -66,7 +70,10 @@ class Registers:
         return problem
 
     def doable(self, *present: str, now_s: float = 0.0) -> list[str]:
-        return doable_in_field(self.problem, self.board, present, now_s)
+        found = doable_in_field(self.problem, self.board, present, now_s)
+        anything = anything_doable_in_field(self.problem, self.board, present, now_s)
+        assert anything == bool(found)
+        return found
 
 
 def visit(stage: BaseStage, *, sortie_end_s: float | None = None, **more: float) -> Claim:

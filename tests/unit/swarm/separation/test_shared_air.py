@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
-from swarm.separation.fleet_ways import Starter
 from swarm.separation.shared_air import SharedAir, adds_nothing
 from swarm.separation.slabs import Slabs, apart
+from swarm.separation.taken_ways import Starter
 
 SLABS = Slabs.between(10.0, (30.0, 42.0))
 FLEET = [Starter(f"u{k}", (100.0 * k, 0.0, 30.0)) for k in range(3)]

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
-from swarm.separation.fleet_ways import FleetWays, Starter
 from swarm.separation.slabs import Slabs, apart, planned_apart_m
+from swarm.separation.taken_ways import Starter, TakenWays
 
 SLABS = Slabs.between(10.0, (30.0,))
 NEAR_M = planned_apart_m(SLABS.separation_m)
@@ -28,7 +28,7 @@ def fleet_of(rng: np.random.Generator, count: int) -> list[Starter]:
 @pytest.mark.parametrize("seed", range(20))
 def test_all_who_are_too_near_to_a_way_are_found_by_whatever_was_said_last(seed: int) -> None:
     rng = np.random.default_rng(seed)
-    ways, claims = FleetWays(fleet_of(rng, 8), NEAR_M), dict[str, Claim]()
+    ways, claims = TakenWays(fleet_of(rng, 8), NEAR_M), dict[str, Claim]()
     left_out = 0
     for number in range(1, 30):
         uav = str(rng.choice(ways.uavs))
@@ -48,7 +48,7 @@ def test_all_who_are_too_near_to_a_way_are_found_by_whatever_was_said_last(seed:
 
 
 def test_who_looks_with_other_words_than_another_one_sees_what_they_say() -> None:
-    ways = FleetWays([Starter("u0", (0.0, 0.0, 30.0)), Starter("u1", (100.0, 0.0, 30.0))], NEAR_M)
+    ways = TakenWays([Starter("u0", (0.0, 0.0, 30.0)), Starter("u1", (100.0, 0.0, 30.0))], NEAR_M)
     gone = Claim(ClaimPhase.OUT, None, 0.0, 0, 0.0, way=ClaimedWay(1, (), heir="u1"))
     place = np.array([[0.0, 5.0, 30.0]])
 

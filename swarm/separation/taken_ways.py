@@ -34,7 +34,7 @@ class Starter:
     """Where it is as long as it has said nothing else [m; its layer included]."""
 
 
-class FleetWays:
+class TakenWays:
     """The ways of one fleet.
 
     Args:
