@@ -346,9 +346,17 @@ class Chances:
     def _legs_from_s(
         self, row: int, seen: LastSeen
     ) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
+        """Times of legs from there [s].
+
+        Who is kept apart in the layer of somebody else flies level there, and upright at the
+        height of its task, as if it was in its own layer: no slanted way is granted to it.
+        """
         east_m, north_m, up_m = seen.place_enu_m
         place = (east_m, north_m, up_m - self._layers_m[row])
-        return self._problem.legs_from_s(row, place, flown_m=up_m)
+        legs_s = self._problem.legs_from_s(row, place, flown_m=up_m)
+        if self._mission.separation_m is None:
+            return legs_s
+        return np.maximum(legs_s, self._problem.legs_from_s(row, (east_m, north_m, 0.0)))
 
     def _base_at(self, seen: LastSeen) -> int | None:
         for number, base in enumerate(self._mission.bases):
