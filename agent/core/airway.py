@@ -242,7 +242,7 @@ class Airway:
             self._stops, place = False, self._stop_enu_m
             shift_m = place[2] - self._nominal(place)[2]
             self._way = replace(way, path_enu_m=(place,), shift_m=shift_m)
-        elif way.path_enu_m:
+        elif way.flies and way.path_enu_m:  # what is only asked for begins where it hovers
             shift_m = 0.0 if self._own_height else way.shift_m
             self._way = replace(way, path_enu_m=way.path_enu_m[-1:], shift_m=shift_m)
         self._at_own_height, self._own_height = self._own_height, False
