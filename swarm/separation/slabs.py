@@ -4,7 +4,8 @@ A slab reaches half-way to the neighbouring layers; the lowest and the highest h
 hills, where a layer is as high above the ground and so not level, slabs are so thin that what is a
 layer apart touches none in common. Two paths that come closer than the separation anywhere are both
 within half of it from one slab at least, so whoever keeps the paths of each slab apart, as seen
-from above, keeps all apart.
+from above, keeps all apart. Between level layers that holds for the separation and a metre: both
+may be wrong by one, and it is kept but for one error of a place.
 """
 
 from __future__ import annotations
@@ -124,9 +125,18 @@ class Slabs:
         ends = [stack * len(self) // count for stack in range(count + 1)]
         return tuple(frozenset(range(low, high)) for low, high in itertools.pairwise(ends))
 
+    @property
+    def _near_m(self) -> float:
+        """Who is no farther than that from a slab may meet somebody in it [m].
+
+        Half of the separation, and as much more for errors of places as lets level flight, half
+        a metre too high or too low, still touch the slab of its layer alone.
+        """
+        return 0.5 * (self.separation_m + (POSITION_ERROR_M if self.level else 0.0))
+
     def reach_m(self, slab: int) -> tuple[float, float]:
         """Heights from which one may come too near to somebody in ``slab`` [m]."""
-        near_m = 0.5 * self.separation_m
+        near_m = self._near_m
         low_m = self.cuts_m[slab - 1] - near_m if slab > 0 else -math.inf
         high_m = self.cuts_m[slab] + near_m if slab < len(self.cuts_m) else math.inf
         return low_m, high_m
@@ -136,7 +146,7 @@ class Slabs:
         if not len(path_enu_m):
             return frozenset()
         lowest_m, highest_m = float(path_enu_m[:, 2].min()), float(path_enu_m[:, 2].max())
-        near_m = 0.5 * self.separation_m
+        near_m = self._near_m
         first = bisect_right(self.cuts_m, lowest_m, key=lambda cut_m: cut_m + near_m)
         last = bisect_left(self.cuts_m, highest_m, key=lambda cut_m: cut_m - near_m)
         return frozenset(range(first, last + 1))

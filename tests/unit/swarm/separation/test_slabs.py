@@ -45,12 +45,14 @@ def sampled(path: np.ndarray) -> np.ndarray:
 
 
 @given(seed=st.integers(0, 2**32 - 1))
-def test_paths_that_are_apart_have_no_two_points_nearer_than_the_separation(seed: int) -> None:
+def test_paths_that_are_apart_have_no_two_points_nearer_than_the_separation_and_1_m(
+    seed: int,
+) -> None:
     rng = np.random.default_rng(seed)
     one, other = path_of(rng, SLABS), path_of(rng, SLABS)
     gaps = np.linalg.norm(sampled(one)[:, None] - sampled(other)[None], axis=2)
     if apart(SLABS, one, other):
-        assert gaps.min() >= SLABS.separation_m - 1e-9  # above each other; beside it is more
+        assert gaps.min() >= SLABS.separation_m + 1.0 - 1e-9  # beside each other it is 2 m more
     assert apart(SLABS, one, other) == apart(SLABS, other, one)
 
 
@@ -136,6 +138,14 @@ def test_level_flight_in_a_layer_touches_its_slab_alone() -> None:
     level = np.array([[0.0, 0.0, 42.0], [50.0, 0.0, 42.0]])
     assert SLABS.touched(level) == {1}
     assert SLABS.asked(level) == {1}
+
+
+def test_a_way_that_slants_past_level_flight_keeps_room_for_errors_of_both_heights() -> None:
+    """Where one ends 10.5 m below the other, which flies in the layer above, they are not apart."""
+    slants = np.array([[0.0, 0.0, 30.0], [50.0, 0.0, 31.5]])
+    level = np.array([[50.0, -50.0, 42.0], [50.0, 50.0, 42.0]])
+    assert not apart(SLABS, slants, level)
+    assert apart(SLABS, slants - np.array([0.0, 0.0, 1.1]), level)
 
 
 def test_who_climbs_from_where_it_hovers_asks_the_layers_above_alone() -> None:
