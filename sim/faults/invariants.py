@@ -15,8 +15,8 @@ Beside the invariants of the messages (sim.faults.message_log):
 - *task lost*: in the end each task that was posted, or added by the operator, is done, failed,
   withdrawn, or open with no UAV able to do it that knew of it before it left, and of a mission
   that had begun, and came home of its own accord; or the operator added it too late, when the
-  coordinator ended the mission. Who found no way there while somebody was lost or not heard, had
-  to land where it was, or come home from a hold, was not able to do it;
+  coordinator ended the mission. Who found no way there, or home, while somebody was lost or not
+  heard (`sim.faults.shut_air`), or whose battery was used up in a hold, was not able to do it;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
 - *too near*: no two UAVs in the air are nearer to each other than the mission's separation, less
   how far one of them may be from where it believes to be;
@@ -47,6 +47,7 @@ from sim.faults.drawn_zones import DrawnZone
 from sim.faults.field_judge import Chances, FieldJudge
 from sim.faults.injector import FaultInjector
 from sim.faults.message_log import MessageLog, Violation
+from sim.faults.shut_air import ShutAir
 from sim.world.closest_approach import closest_approach
 from sim.world.engine import Process
 from sim.world.rough_network import RoughNetwork
@@ -58,7 +59,6 @@ from swarm.protocol.messages import CommandKind, Message, MissionPhase, PlanEpoc
 from swarm.protocol.operator_commands import abort_command, newest_command, zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, StatusPhase
-from swarm.separation.taken_ways import is_home
 
 SETTLED_S = 5.0
 """Calm for this long, the fleet must agree."""
@@ -90,11 +90,8 @@ class InvariantChecker:
         self.message_log = MessageLog()
         self._lives: dict[Process, int] = {}
         self._changed_s: dict[str, float] = {}
-        self._without_way: set[tuple[str, str]] = set()
-        """UAV and task, to which it found no way while air was shut by somebody who was missing."""
-        self._taken_out: set[str] = set()
-        """UAVs that landed where they were, for want of a way home, or whose battery was used up
-        while the operator held them."""
+        self._used_up: set[str] = set()
+        """UAVs whose battery was used up while the operator held them."""
         self._steps = 0
         self._steps_at_s = 0.0
         self._left_in_calm: set[str] = set()
@@ -112,6 +109,7 @@ class InvariantChecker:
     def attend(self, world: World, network: RoughNetwork, injector: FaultInjector) -> None:
         """Watch this world, which has not begun."""
         self._world, self._network, self._injector = world, network, injector
+        self.shut_air = ShutAir(world, network, injector)
         self._zone_known_s: dict[str, dict[str, float]] = {}
         """By zone drawn in flight: since when each UAV's agent knows of it, or later [s]."""
         world.queue.at(LOOK_EVERY_S, self._look)
@@ -133,7 +131,9 @@ class InvariantChecker:
         core = process.core
         match message.body:
             case Claim(phase=ClaimPhase.OUT) if isinstance(core, AgentCore):
-                self._left_undone.setdefault(process.name, _on_board(core.replica))
+                if process.name not in self._left_undone:
+                    self._left_undone[process.name] = _on_board(core.replica)
+                    self.shut_air.left(process)
             case Claim():
                 self._left_undone.pop(process.name, None)
             case PlanEpoch(phase=MissionPhase.ENDED) if isinstance(
@@ -175,10 +175,11 @@ class InvariantChecker:
             self.message_log.gave_up(process.name, str(released))
         if note.text == "no way" and "task" in note.fields:
             self.message_log.refused(process.name, str(note.fields["task"]))
-            if isinstance(process.core, AgentCore) and self._lacks_somebody(process, process.core):
-                self._without_way.add((process.name, str(note.fields["task"])))
-        if note.text == "lands where it is" or (note.text == "returning" and _is_held(process)):
-            self._taken_out.add(process.name)
+        self.shut_air.noted(process, note)
+        used_up = note.text == "returning" and _is_held(process)
+        if used_up:
+            self._used_up.add(process.name)
+        if used_up or note.text == "lands where it is":
             self.message_log.gave_up(process.name, str(note.fields.get("task")))
         if note.text == "turns aside":
             self.message_log.turned_aside(self._now_s, process.name, str(note.fields["task"]))
@@ -208,6 +209,8 @@ class InvariantChecker:
             self._world.queue.after(LOOK_EVERY_S, self._look)
         agents = [(p, core) for p, core in self._living() if isinstance(core, AgentCore)]
         self._note_known_zones(agents)
+        for process, _ in agents:
+            self.shut_air.look(process)
         self._look_for_disobedience(agents)
         self._look_for_shared_tasks(agents)
         self._look_for_equal_registers(agents)
@@ -301,7 +304,7 @@ class InvariantChecker:
             for uav in world.mission.uavs
             if world.finished.get(uav.id) == 0
             and not message_log.sent_home(uav.id)
-            and uav.id not in self._taken_out
+            and uav.id not in self._used_up | self.shut_air.landed
         ]
         to_do = {
             uav: self._left_undone.get(uav, _on_board(core.replica))
@@ -321,7 +324,8 @@ class InvariantChecker:
                 for uav in home
                 if world.mission.success(uav, task) > 0.0
                 and task.id in to_do.get(uav.id, ())
-                and (uav.id, task.id) not in world.refuses | self._without_way
+                and (uav.id, task.id) not in world.refuses
+                and not self.shut_air.keeps_from(uav.id, task.id)
             ]
             if able and is_field(world.mission):
                 able = self._able_in_field(able, task)
@@ -357,32 +361,13 @@ class InvariantChecker:
         stands = Counter(
             stay.base
             for stay in self._world.flight_log.stays
-            if stay.begin_s <= at_s < stay.end_s and self._is_lost(stay.uav)
+            if stay.begin_s <= at_s < stay.end_s and self.shut_air.is_lost(stay.uav)
         )
         return {
             base.id
             for base in self._world.mission.bases
             if base.slots is not None and stands[base.id] >= base.slots
         }
-
-    def _is_lost(self, uav: str) -> bool:
-        """Whether nobody speaks for ``uav`` any more, and it did not end by itself."""
-        process = self._world.processes[uav]
-        silent = process.over or process in self._injector.held_for_good
-        return silent and uav not in self._world.finished
-
-    def _lacks_somebody(self, process: Process, core: AgentCore) -> bool:
-        """Whether any of the fleet is gone or not heard, and not known to be home.
-
-        Its air is shut, and its seats.
-        """
-        world, claims = self._world, core.replica.claims
-        others = (world.processes[uav] for uav in world.agents if uav != process.name)
-        return any(
-            not is_home(claims.get(other.name))
-            and (self._is_lost(other.name) or not self._network.joined(process, other))
-            for other in others
-        )
 
     def _drawn_over(self, uav: str, at_s: float) -> Iterator[Zone]:
         """Zones drawn in flight that may have kept ``uav`` from what it left undone then."""

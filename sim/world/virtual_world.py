@@ -116,7 +116,8 @@ class World:
         self._make_plan = make_plan
         self._method = method
         self._seed = seed
-        self._timing = timing
+        self.timing = timing
+        """Of all processes [virtual s]."""
         self._faults = faults or ScheduledLosses()
         self._setting = setting or WorldSettings(lambda queue: IdealNetwork(queue, latency_s))
         self.network = self._setting.network(self.queue)
@@ -253,7 +254,7 @@ class World:
             self.mission.name,
             wish,
             incarnation=1_000_000 + round(1e3 * self.queue.now_s()),
-            timing=self._timing,
+            timing=self.timing,
             patience_s=OPERATOR_PATIENCE_S,
         )
         self.operators.append(seat)
@@ -415,13 +416,13 @@ class World:
                 later_ms = round(1e3 * (self.queue.now_s() - begun_s))
                 return self._coordinator(incarnation + later_ms, memory, memory_age_s)
 
-            core = StandbyCore(self.mission, make_coordinator, self._timing, known, age_s)
+            core = StandbyCore(self.mission, make_coordinator, self.timing, known, age_s)
             return new(None, core, snapshot=core.snapshot)
         agent = self._setting.agent(
             self.mission.name,
             name,
             incarnation,
-            self._timing,
+            self.timing,
             memory=known,
             memory_age_s=age_s,
             without_bus_s=self._setting.without_bus_s,
@@ -444,7 +445,7 @@ class World:
             method=self._method,
             seed=self._seed,
             incarnation=incarnation,
-            timing=self._timing,
+            timing=self.timing,
             start_timeout_s=self._setting.start_timeout_s,
             layers=FlightLayers(),
             memory=memory,

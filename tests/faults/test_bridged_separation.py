@@ -10,7 +10,6 @@ from agent.vehicle.config import CommandStyle
 from sim.autopilot.firmware import FirmwareModelName
 from sim.faults.injector import FaultInjector
 from sim.faults.invariants import InvariantChecker
-from sim.faults.schedule import DisturbanceKind
 from sim.world.engine import EventQueue
 from sim.world.network import NetworkConditions
 from sim.world.rough_network import RoughNetwork
@@ -26,6 +25,7 @@ from tests.support.bridged_fleet import KINDS, ONE_DIAGONAL, OTHER_DIAGONAL
 
 LONGEST_S = 2_400.0
 """No flight takes longer, keepers of air that are lost until their batteries are empty included."""
+FORSAKEN = "no coordinator and nothing left to do"
 CROSSING = mission_of(((-80.0, 0.0), (80.0, 0.0)), ((0.0, -80.0), (0.0, 80.0)))
 HEAD_ON = mission_of(((-80.0, 0.0), (80.0, 0.0)), ((80.0, 0.0), (-80.0, 0.0)))
 
@@ -124,19 +124,20 @@ def test_random_ways_with_all_that_goes_wrong(
 
     fleet.world.run(LONGEST_S)
 
+    judge.conclude()
+
     told = "\n".join((*map(str, drawn.schedule), str(fleet.nearest), *fleet.told()))
     assert judge.broken is None, f"{judge.broken}\n{told}"
     assert fleet.nearest_m >= SEPARATION_M, told
-    # Who hangs may come back, and the coordinator waits to tell it of the end.
-    hangs = any(each.kind is DisturbanceKind.DEADLOCK for each in drawn.schedule)
-    waits = {COORDINATOR} if hangs and drawn.for_good else set[str]()
-    assert set(fleet.world.alive) <= drawn.for_good | waits, told
-    if fleet.world.zero_s is None:  # it was lost before the mission began
+    assert set(fleet.world.alive) <= drawn.for_good, told
+    flies = {f"t{n}": uav for n, uav in enumerate(fleet.books) if uav not in drawn.for_good}
+    if fleet.world.zero_s is None:  # its coordinator was lost before: nobody else begins a mission
         assert COORDINATOR in drawn.for_good, told
+        assert {fleet.note(uav) for uav in flies.values()} == {FORSAKEN}, told
         return
-    done, gone = set(fleet.world.mission_state.result().done), drawn.for_good & set(fleet.books)
-    if not (planned and gone):  # the air that a lost one keeps may stay shut
-        assert {f"t{n}" for n, uav in enumerate(fleet.books) if uav not in gone} <= done, told
+    done = set(fleet.world.mission_state.result().done)
+    kept_from = {task for task, uav in flies.items() if judge.shut_air.keeps_from(uav, task)}
+    assert flies.keys() - kept_from <= done, told
 
 
 @ONE_DIAGONAL
