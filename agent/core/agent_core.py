@@ -88,8 +88,7 @@ class AgentCore(AgentPart):
             beforehand; None for vehicles that take no time for it.
         without_bus_s: go home when the own link to the bus has been down for that long; None
             to fly on.
-        make_rule: what it decides by in an epoch of that rule and those routes. Every UAV of a
-            fleet needs the same.
+        make_rule: what it decides by, given an epoch's rule and routes; alike for the fleet.
         make_field_rule: the same where the field's constraints count.
         shows_stations: whether there are ground stations to be shown what it does.
     """

@@ -13,7 +13,7 @@ from sim.world.engine import Process
 from sim.world.rough_network import RoughNetwork
 from sim.world.virtual_world import World
 from swarm.protocol.events import LogLine
-from swarm.separation.shared_air import is_home
+from swarm.separation.taken_ways import is_home
 
 _LOOKS_AGAIN_S = 5.0
 """After a task that was refused is considered again, it takes at most so long to be flown to."""

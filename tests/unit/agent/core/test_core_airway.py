@@ -8,7 +8,8 @@ from agent.core.interface import Held, Prepare, VehicleReady
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.protocol.messages import CommandKind, OperatorCommand
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
-from swarm.separation.shared_air import SharedAir, air_of_brief, is_home
+from swarm.separation.shared_air import SharedAir, air_of_brief
+from swarm.separation.taken_ways import is_home
 from tests.support.builders import uav
 from tests.support.lone_agent import ABOVE_START, LoneAgent, orders
 
