@@ -16,6 +16,16 @@ from swarm.protocol.events import CommonAction, CommonEvent, MessagesReceived
 
 
 @dataclass(frozen=True, slots=True)
+class Runway:
+    """Where a vehicle touches down that cannot land upright."""
+
+    position_enu_m: tuple[float, float, float]
+    """The place [m; mission origin], on the ground."""
+    heading_rad: float
+    """In which it touches down, clockwise from north."""
+
+
+@dataclass(frozen=True, slots=True)
 class Prepare:
     """Get airborne and under command: wait until ready, arm, take off, reach the place."""
 
@@ -38,6 +48,8 @@ class Prepare:
     they run, nobody else has taken it since and it is ours, on the ground or on its way up."""
     vehicle: VehicleKind = VehicleKind.COPTER
     """What it is to be; any other is not started."""
+    runway: Runway | None = None
+    """Where and how it lands, if it needs a runway for that."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -28,6 +28,7 @@ from agent.core.interface import (
     Return,
     ReturnAdvised,
     ReturnBegun,
+    Runway,
     Swap,
     Swapped,
     Telemetry,
@@ -203,6 +204,7 @@ class VehicleCommander(AgentPart):
             acceleration_m_s2=me.acceleration_m_s2,
             begun=self.begun,
             vehicle=me.vehicle,
+            runway=_runway_of(me),
         )
         self._order(order)
 
@@ -323,3 +325,9 @@ class VehicleCommander(AgentPart):
         self._log("of the vehicle given up", reason=reason)
         if not self._tasking.is_handed_over:
             self._tasking.end(now_s, handed_over=True)
+
+
+def _runway_of(me: UavSpec) -> Runway | None:
+    """Where it lands, if that is not upright."""
+    heading_rad = me.landing_heading_rad
+    return None if heading_rad is None else Runway(me.position_enu_m, heading_rad)

@@ -51,7 +51,7 @@ from agent.vehicle.messages import (
     SystemStatus,
 )
 from agent.vehicle.obedience import obey
-from agent.vehicle.preparation import Preparing
+from agent.vehicle.preparing import Preparing
 from agent.vehicle.returning import Returning
 from agent.vehicle.session import (
     BridgeEvent,

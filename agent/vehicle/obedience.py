@@ -32,7 +32,7 @@ from agent.vehicle.holding import Holding, modes_to_leave
 from agent.vehicle.landing import Landing
 from agent.vehicle.leg import Flying
 from agent.vehicle.messages import LandedState
-from agent.vehicle.preparation import Preparing
+from agent.vehicle.preparing import Preparing
 from agent.vehicle.returning import Returning, ReturnVia
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.standing import Departing, Standing

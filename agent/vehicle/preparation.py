@@ -19,7 +19,6 @@ import math
 from dataclasses import dataclass
 
 from agent.core.interface import Prepare
-from agent.vehicle.activity import Activity, FlightPhase
 from agent.vehicle.commands import CommandEnded, RepeatedCommand, VehicleCommand, result_text
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.flight_limits import LimitsCheck
@@ -34,9 +33,9 @@ from agent.vehicle.preflight import (
     home_alt_m,
     start_fault,
     with_warning,
-    wrong_kind,
 )
-from agent.vehicle.session import VehicleSession
+from agent.vehicle.runway_check import RunwayCheck
+from agent.vehicle.session import PASSES_M, VehicleSession
 from agent.vehicle.supervision import PilotConsent
 from swarm.model.frames import wgs84_from_enu
 
@@ -47,7 +46,7 @@ _CLIMB_TOLERANCE_M = 1.0
 _CAME_DOWN = (
     "it was left in the air and stands on the ground now: look after it, start it with --rejoin"
 )
-_NO_PLACE = "waiting for a position"
+NO_PLACE = "waiting for a position"
 _NOT_ITS_TURN = "waiting for its turn to take off"
 _CLIMB_STOPPED = "the vehicle took off and then stopped climbing"
 _ARMED_BY_OTHERS = "somebody else armed it and disarmed it again; prepare it again to take off"
@@ -62,7 +61,7 @@ class _Step:
     command: RepeatedCommand
 
 
-class _Preparation:
+class Preparation:
     """The steps of one preparation of one vehicle.
 
     Args:
@@ -104,6 +103,9 @@ class _Preparation:
         self._speed = CruiseSpeedSetting(order.speed_m_s, firmware, session)
         self._failsafes = FailsafeCheck(firmware, session)
         self._limits = LimitsCheck(firmware, session, order.speed_m_s)
+        self._runway = RunwayCheck(firmware, session, order.runway)
+        self._rising_s = -math.inf
+        """When it was last seen to take off in a mode of its own."""
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
         self.done = False
@@ -145,6 +147,7 @@ class _Preparation:
         """Take what matters of a message beside the vehicle's state."""
         self._failsafes.on_message(message)
         self._limits.on_message(message)
+        self._runway.on_message(message)
         if self._leg is not None:
             self._leg.on_message(message)
         self._speed.on_message(message)
@@ -180,7 +183,7 @@ class _Preparation:
                     self._failsafes.ask()
                 self._session.say(*started)
         elif vehicle.position is None:
-            self.waiting_for = _NO_PLACE
+            self.waiting_for = NO_PLACE
         elif (airborne := firmware.airborne(vehicle)) is None:
             self.waiting_for = "waiting to hear whether it flies (EXTENDED_SYS_STATE)"
         elif objection := self._consent.objection(airborne=airborne):
@@ -234,7 +237,9 @@ class _Preparation:
         self._session.say(*self._takeoff.command.cancel(self._session.now_s))
         if self._arm.command.given:  # what it does without us may not have been read to the end
             self._failsafes.ask()
-        if not self._climbing or self._high_enough(position):
+        if self._session.now_s < self._rising_s + self._firmware.steadies_s:
+            self.waiting_for = "letting it fly steadily after takeoff"
+        elif not self._climbing or self._high_enough(position):
             self._climbing = False
             self._settle(position)
 
@@ -249,7 +254,7 @@ class _Preparation:
         if self._flew:
             return self._fail("the vehicle disarmed after takeoff")
         if self._order.left_in_air and not self._arm.command.given:
-            return self._wait(_NO_PLACE) if vehicle.position is None else self._fail(_CAME_DOWN)
+            return self._wait(NO_PLACE) if vehicle.position is None else self._fail(_CAME_DOWN)
         if unready := self._firmware.unready(vehicle):
             return self._wait(with_warning(self._session, unready))
         if objection := self._session.arming_objection():
@@ -263,6 +268,8 @@ class _Preparation:
             return self._wait(objection)
         if self._mission is not None and not self._mission.is_uploaded:
             return self._upload_way_home(self._mission)
+        if objection := self._runway.advance():
+            return self._wait_for_runway(objection)
         if self._session.awaits_turn:
             return self._wait(_NOT_ITS_TURN)
         self._consent.arm()
@@ -281,7 +288,7 @@ class _Preparation:
 
     def _take_off(self, position: Position) -> list[Outbound]:
         if not self._aims_at(position):
-            return self._wait(_NO_PLACE)
+            return self._wait(NO_PLACE)
         self._climbing = True
         self._climbed_at_s = self._session.now_s
         self._highest_m = position.alt_m
@@ -292,13 +299,15 @@ class _Preparation:
             return self._fail(fault)
         if self._mission is not None and not self._mission.is_uploaded and not self.took_off:
             return self._upload_way_home(self._mission)
+        if not self.took_off and (objection := self._runway.advance()):
+            return self._wait_for_runway(objection)
         self._session.launched_enu_m = self._session.known_place_m()
         command = self._firmware.takeoff(self._start_alt_m(), home_alt_m(position))
         return self._ask(self._takeoff, command)
 
     def _follow_takeoff(self) -> None:
         """Wait for the end of a takeoff that the vehicle carries out in a mode of its own."""
-        self._saw_takeoff = True
+        self._saw_takeoff, self._rising_s = True, self._session.now_s
         if not self.took_off:
             # An earlier life's, or a pilot's.
             self._flown_by_pilot = self._consent.needed
@@ -316,6 +325,8 @@ class _Preparation:
         tolerance_m = max(
             self._config.acceptance_radius_m, _CLIMB_TOLERANCE_M, _CLIMB_TOLERANCE_FRAC * height_m
         )
+        if self._firmware.traits.needs_runway:  # it has ended its take-off, and circles
+            tolerance_m = max(tolerance_m, PASSES_M)
         if position.alt_m >= start_alt_m - tolerance_m:
             return True
         self.waiting_for = f"climbing to {height_m:.0f} m"
@@ -327,7 +338,7 @@ class _Preparation:
         """Fly to the start, unless the vehicle is resumed in the air, and set the speed."""
         speed = self._speed
         if self._leg is None and not self._resumes and not self._aims_at(position):
-            self.waiting_for = _NO_PLACE
+            self.waiting_for = NO_PLACE
             return
         if self._leg is None and not self._resumes and not self._is_barred:
             place = (self._order.position_enu_m, self._order.speed_m_s)
@@ -361,6 +372,9 @@ class _Preparation:
         """Whether it flies on orders of an earlier life, beyond its takeoff."""
         taking_off = self._saw_takeoff or self._session.vehicle.landed is LandedState.TAKEOFF
         return self._order.resume and not self.took_off and not taking_off
+
+    def _wait_for_runway(self, objection: str) -> list[Outbound]:
+        return self._fail(objection) if self._runway.failure else self._wait(objection)
 
     def _upload_way_home(self, mission: OnboardMission) -> list[Outbound]:
         """Put a mission on the vehicle that waits at the start and then comes home."""
@@ -415,86 +429,3 @@ class _Preparation:
     def _fail(self, reason: str) -> list[Outbound]:
         self.failure = reason
         return []
-
-
-class Preparing(Activity):
-    """Prepares the vehicle for flight, once there is one to command.
-
-    Args:
-        ours: the vehicle flew, or was about to fly, on our orders.
-    """
-
-    phase = FlightPhase.PREPARING
-    polls = True
-    may_disarm = True
-    """Autopilots disarm by themselves if nothing follows."""
-
-    def __init__(self, session: VehicleSession, order: Prepare, *, ours: bool) -> None:
-        super().__init__(session)
-        self.order = order
-        self._ours = ours
-        self._preparation: _Preparation | None = None
-
-    @property
-    def in_our_hands(self) -> bool:
-        """Whether the motors run, or may run, because of us."""
-        return self._preparation is not None and self._preparation.engaged
-
-    @property
-    def took_off(self) -> bool:
-        """Whether it has asked for takeoff."""
-        return self._preparation is not None and self._preparation.took_off
-
-    @property
-    def done(self) -> bool:
-        """Whether the vehicle is where it should be, with its cruise speed set."""
-        return self._preparation is not None and self._preparation.done and self._session.is_placed
-
-    @property
-    def failure(self) -> str | None:
-        """Why it will not get there; None while it may."""
-        return None if self._preparation is None else self._preparation.failure
-
-    @property
-    def disturbed(self) -> bool:
-        """Whether somebody else was seen to have armed or flown it."""
-        return self._preparation is not None and self._preparation.disturbed
-
-    def begin_anew(self) -> None:
-        """It is another vehicle, as far as what was begun goes."""
-        self._preparation = None
-
-    def on_reboot(self) -> None:
-        """The autopilot began anew."""
-        self._preparation, self._ours = None, False
-
-    def on_message(self, message: Inbound) -> None:
-        """Take what matters of a message beside the vehicle's state."""
-        if self._preparation is not None:
-            self._preparation.on_message(message)
-
-    def on_position(self, position: Position) -> None:
-        """Take a fresh position."""
-        if self._preparation is not None:
-            self._preparation.on_position(position)
-
-    def on_ended(self, ended: CommandEnded) -> None:
-        """Take the outcome of a command."""
-        if self._preparation is not None:
-            self._preparation.on_ended(ended)
-
-    def advance(self) -> None:
-        """Do what the state seen asks for next, and say what is waited for."""
-        session, heartbeat = self._session, self._session.vehicle.heartbeat
-        if reason := session.missing() or wrong_kind(self.order, session.firmware):
-            session.tell_not_ready(reason)
-            return
-        if heartbeat is None or session.firmware is None:
-            return
-        if self._preparation is None:
-            self._preparation = _Preparation(session, session.firmware, self.order, ours=self._ours)
-        preparation = self._preparation
-        preparation.advance(heartbeat)
-        preparation.tell_cautions()
-        if not self.done and preparation.failure is None:
-            session.tell_not_ready(_NO_PLACE if preparation.done else preparation.waiting_for)

@@ -17,7 +17,7 @@ from dataclasses import replace
 
 from agent.core.interface import GoTo, Prepare, Swap
 from agent.vehicle.activity import Activity, FlightPhase
-from agent.vehicle.preparation import Preparing
+from agent.vehicle.preparing import Preparing
 from agent.vehicle.session import VehicleSession
 from swarm.protocol.operator_commands import NOT_READY
 

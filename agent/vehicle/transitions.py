@@ -37,7 +37,7 @@ from agent.vehicle.obedience import (
     return_home,
     stand_there,
 )
-from agent.vehicle.preparation import Preparing
+from agent.vehicle.preparing import Preparing
 from agent.vehicle.returning import Returning
 from agent.vehicle.session import VehicleSession
 from agent.vehicle.standing import Departing, Standing

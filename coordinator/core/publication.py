@@ -64,6 +64,7 @@ def mission_config_of(mission: Mission, layers: FlightLayers, run: int) -> Missi
                 airspeed_m_s=uav.airspeed_m_s,
                 endurance_s=uav.endurance_s,
                 vehicle=uav.vehicle,
+                landing_heading_rad=uav.landing_heading_rad,
                 **_shares_of(uav),
             )
             for uav, layer_m in zip(mission.uavs, layers_m, strict=True)

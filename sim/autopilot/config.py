@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sim.autopilot.circling_motion import CirclingMotion
+from sim.autopilot.circling_motion import CirclingMotion, RunwayMotion
 from sim.autopilot.turning_motion import TurningMotion
 from sim.world.motion import IdealMotion, Motion, Point, SmoothMotion
 from sim.world.wind import Wind, WindyMotion, gusts_of
@@ -155,6 +155,8 @@ class VehicleConfig:
     vehicle: VehicleKind = VehicleKind.COPTER
     circle_m: float | None = None
     """Radius on which a plane turns, and waits [m]; of others None."""
+    heading_rad: float = 0.0
+    """In which it stands, clockwise from north; of no matter but to a plane on a runway."""
 
     def __post_init__(self) -> None:
         if not 1 <= self.system_id <= 254:
@@ -197,6 +199,9 @@ class VehicleConfig:
 
     def motion(self) -> Motion:
         """How it moves from its start on."""
+        if self.circle_m is not None and TRAITS[self.vehicle].needs_runway:
+            place_enu_m, speed_m_s = self.start_enu_m, self.cruise_m_s
+            return RunwayMotion(place_enu_m, self.circle_m, self.heading_rad, speed_m_s)
         if self.circle_m is not None:
             return CirclingMotion(self.start_enu_m, self.circle_m)
         motion: Motion = IdealMotion(self.start_enu_m)
@@ -310,6 +315,7 @@ def fleet_of(
             wind=physics.wind(mission, place),
             vehicle=uav.vehicle,
             circle_m=uav.turn_radius_m,
+            heading_rad=uav.landing_heading_rad or 0.0,
         )
         if mission.bases:
             config = replace(config, land_m_s=_LAND_M_S, descent_m_s=_DESCENT_M_S)

@@ -6,7 +6,7 @@ import math
 from enum import Enum
 
 from agent.vehicle.firmware.kinematics import JerkCost
-from sim.autopilot.circling_motion import CirclingMotion
+from sim.autopilot.circling_motion import CirclingMotion, RunwayMotion
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.parameters import ENDLESS, ParameterRole, ParameterTable
 from sim.world.motion import Motion, Point
@@ -50,6 +50,10 @@ _HALVINGS = 40
 
 _NEAR_GROUND_M = 10.0
 """From here down a landing is slow [m]: ArduCopter's LAND_ALT_LOW, PX4's MPC_LAND_ALT1."""
+
+
+RunwayPlaces = tuple[Point, Point]
+"""The middle of the circle that a plane leaves for a runway, and where it touches down [m]."""
 
 
 class MotionPhase(Enum):
@@ -98,6 +102,8 @@ class FlightStateMachine:
         self._takes_time = config.acceleration_m_s2 is not None
         self._jerk_cost_s = jerk_cost_s
         self._on_wings = motion if isinstance(motion, CirclingMotion) else None
+        self._on_runway = motion if isinstance(motion, RunwayMotion) else None
+        self._landing_enu_m: RunwayPlaces | None = None
         self.drives = TRAITS[config.vehicle].drives
         """It stays on the ground."""
         self._touchdown_s = config.touchdown_s
@@ -232,8 +238,12 @@ class FlightStateMachine:
         else:
             self._descend(MotionPhase.FALLING, _FALL_M_S, now_s)
 
-    def return_home(self, now_s: float) -> None:
-        """Rise to the return height if below it, fly home, wait, land; or drive there, and stay."""
+    def return_home(self, now_s: float, landing_enu_m: RunwayPlaces | None = None) -> None:
+        """Rise to the return height if below it, fly home, wait, land; or drive there, and stay.
+
+        One that needs a runway lands at that, or circles over home where there is none.
+        """
+        self._landing_enu_m = landing_enu_m
         if self.on_ground:
             self.hold(now_s)
         if self.activity in (MotionPhase.GROUNDED, MotionPhase.TOUCHED_DOWN):
@@ -270,6 +280,8 @@ class FlightStateMachine:
                     self.hold(at_s)
                 self.activity = MotionPhase.HOLDING
                 return Milestone.REACHED
+            case MotionPhase.CLIMBING | MotionPhase.RETURNING if self._on_runway is not None:
+                self._come_down(self._on_runway, at_s)
             case MotionPhase.CLIMBING:
                 _, _, up_m = self.motion.target_enu_m
                 above_home_enu_m = (*self.home_enu_m[:2], up_m)
@@ -297,6 +309,20 @@ class FlightStateMachine:
             case MotionPhase.GROUNDED | MotionPhase.HOLDING:
                 pass
         return Milestone.UNDERWAY
+
+    def _come_down(self, motion: RunwayMotion, now_s: float) -> None:
+        """From the circle on which it climbed to that before the runway, and from there down."""
+        landing_enu_m = self._landing_enu_m
+        self._timer_s = self._near_s = None
+        if self.activity is MotionPhase.CLIMBING:
+            self.activity = MotionPhase.RETURNING
+            above_home_enu_m = (*self.home_enu_m[:2], motion.target_enu_m[2])
+            motion.climb_to(landing_enu_m[0] if landing_enu_m else above_home_enu_m, now_s)
+        elif landing_enu_m is None:
+            self.activity = MotionPhase.HOLDING
+        else:
+            self.activity, self._is_high = MotionPhase.LANDING, False
+            motion.glide(landing_enu_m[1], now_s)
 
     def _lift(self, now_s: float) -> None:
         east_m, north_m, _ = self._stopped_enu_m(now_s)

@@ -8,6 +8,7 @@ https://mavlink.io/en/messages/common.html#MAV_CMD.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
@@ -22,6 +23,7 @@ _PLACES = frozenset(
         mavlink.MAV_CMD_NAV_LOITER_UNLIM,
         mavlink.MAV_CMD_NAV_LOITER_TIME,
         mavlink.MAV_CMD_NAV_LAND,
+        mavlink.MAV_CMD_NAV_LOITER_TO_ALT,
         mavlink.MAV_CMD_NAV_TAKEOFF,
         mavlink.MAV_CMD_DO_SET_ROI_LOCATION,
     }
@@ -29,6 +31,7 @@ _PLACES = frozenset(
 
 _DONE_AT_ONCE = frozenset(
     {
+        mavlink.MAV_CMD_DO_LAND_START,
         mavlink.MAV_CMD_DO_CHANGE_SPEED,
         mavlink.MAV_CMD_DO_GUIDED_LIMITS,
         mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST,
@@ -42,15 +45,19 @@ LOOKS = frozenset({mavlink.MAV_CMD_DO_SET_ROI_LOCATION, mavlink.MAV_CMD_DO_SET_R
 
 _GIVES_WAY = frozenset({mavlink.MAV_CMD_NAV_GUIDED_ENABLE, mavlink.MAV_CMD_DO_GUIDED_LIMITS})
 
+_OF_RUNWAYS = frozenset({mavlink.MAV_CMD_DO_LAND_START, mavlink.MAV_CMD_NAV_LOITER_TO_ALT})
+
 _NAMES = {
     mavlink.MAV_CMD_NAV_WAYPOINT: "WP",
     mavlink.MAV_CMD_NAV_LOITER_UNLIM: "LoitUnlim",
     mavlink.MAV_CMD_NAV_LOITER_TIME: "LoitTime",
+    mavlink.MAV_CMD_NAV_LOITER_TO_ALT: "LoitAltitude",
     mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: "RTL",
     mavlink.MAV_CMD_NAV_LAND: "Land",
     mavlink.MAV_CMD_NAV_TAKEOFF: "Takeoff",
     mavlink.MAV_CMD_NAV_GUIDED_ENABLE: "GuidedEnable",
     mavlink.MAV_CMD_DO_CHANGE_SPEED: "ChangeSpeed",
+    mavlink.MAV_CMD_DO_LAND_START: "LandStart",
     mavlink.MAV_CMD_DO_GUIDED_LIMITS: "GuidedLimits",
     mavlink.MAV_CMD_DO_SET_CAM_TRIGG_DIST: "SetCamTrigDst",
     mavlink.MAV_CMD_DO_SET_ROI_LOCATION: "SetROILocation",
@@ -98,10 +105,12 @@ INT_FRAMES: dict[int, int] = {kept: sent for sent, kept in _FRAMES_KEPT.items()}
 
 
 def item_from_message(
-    message: mavlink.MAVLink_message, *, gives_way: bool
+    message: mavlink.MAVLink_message, *, gives_way: bool, lands_on_runways: bool = False
 ) -> StoredMissionItem | int:
     """The item in a MISSION_ITEM or MISSION_ITEM_INT, or the MAV_MISSION_RESULT of refusing it."""
     if message.command not in _NAMES or (message.command in _GIVES_WAY and not gives_way):
+        return int(mavlink.MAV_MISSION_UNSUPPORTED)
+    if message.command in _OF_RUNWAYS and not lands_on_runways:
         return int(mavlink.MAV_MISSION_UNSUPPORTED)
     # Yaw is given as NaN where it doesn't matter; one NaN, so that equal items are equal.
     yaw_deg = math.nan if math.isnan(message.param4) else message.param4
@@ -183,3 +192,19 @@ def home_item(origin: Origin, home_enu_m: Point) -> StoredMissionItem:
         lon_e7=lon_e7,
         height_m=alt_mm / 1e3,
     )
+
+
+def runway_places_enu_m(
+    items: Sequence[StoredMissionItem], origin: Origin, home_enu_m: Point
+) -> tuple[Point, Point] | None:
+    """Where the landing of a mission circles, and where it touches down [m]; None without one."""
+    wanted = (mavlink.MAV_CMD_NAV_LOITER_TO_ALT, mavlink.MAV_CMD_NAV_LAND)
+    commands = [item.command for item in items]
+    if mavlink.MAV_CMD_DO_LAND_START not in commands:
+        return None
+    start = commands.index(mavlink.MAV_CMD_DO_LAND_START)
+    found = [item for item in items[start:] if item.command in wanted]
+    if tuple(item.command for item in found) != wanted:
+        return None
+    circle, ground = (item_place_enu_m(item, origin, home_enu_m, home_enu_m[2]) for item in found)
+    return circle, ground

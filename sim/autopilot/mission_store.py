@@ -168,7 +168,11 @@ class MissionServer:
         item = (
             fence_item_from_message(message, FENCE_COMMANDS)
             if kind == _FENCE
-            else item_from_message(message, gives_way=self._behaviour.gives_way)
+            else item_from_message(
+                message,
+                gives_way=self._behaviour.gives_way,
+                lands_on_runways=self._behaviour.lands_on_runways,
+            )
         )
         if self._behaviour.gives_up_silently and has_too_few_corners(item):
             item = int(mavlink.MAV_MISSION_ERROR)

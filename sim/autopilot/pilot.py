@@ -280,7 +280,7 @@ class Pilot:
             self.stay_on_ground(now_s)
 
     def _return(self, now_s: float) -> None:
-        self.flight.return_home(now_s)
+        self.flight.return_home(now_s, self.flavour.landing_enu_m(self))
         if self.flight.activity is MotionPhase.CLIMBING:
             up_m = self.flight.motion.target_enu_m[2]
             self.narrator.tell(

@@ -6,8 +6,8 @@ port 5760 + 10 n; a ground station may connect to the port two above. It goes on
 agent is there (ArduPilot, ``libraries/AP_HAL_SITL/SITL_cmdline.cpp``;
 https://ardupilot.org/dev/docs/sitl-serial-mapping.html). PX4 is a build folder with ``bin/px4``
 and ``etc``: everything but the instance is said by environment variables, the vehicle is the
-quadrotor of its own simulator, which needs no other program, instance n has system id n + 1 and
-speaks to UDP port 14540 + n; a ground station is spoken to at 14550 (PX4-Autopilot,
+quadrotor or the airplane of its own simulator, which needs no other program, instance n has system
+id n + 1 and speaks to UDP port 14540 + n; a ground station is spoken to at 14550 (PX4-Autopilot,
 ``Tools/simulation/sitl_multiple_run.sh``,
 ``ROMFS/px4fmu_common/init.d-posix/{rcS,px4-rc.mavlink,px4-rc.simulator}`` and
 ``src/modules/simulation/simulator_sih/sih.cpp``; https://docs.px4.io/main/en/sim_sih/).
@@ -29,6 +29,7 @@ from pathlib import Path
 from typing import Final
 
 from sim.fleet.ardupilot_vehicles import ARDUPILOT_VEHICLES
+from sim.fleet.px4_vehicles import PX4_VEHICLES
 from swarm.model import Mission, Uav
 from swarm.model.frames import DEFAULT_ORIGIN, wgs84_from_enu
 from swarm.model.vehicles import VehicleKind
@@ -46,17 +47,8 @@ _PX4_PORT: Final = 14540
 _PX4_MOST: Final = 10
 """From its eleventh instance on PX4 speaks to one and the same UDP port."""
 
-_PX4_DRAG_N_PER_M_S: Final = 0.3
-"""Of the simulator's quadrotor of 1 kg. Its own 1.0 lets nothing fall faster than 10 m/s and
-takes a tilt of 39° at 8 m/s, where a real one takes 10° to 15°: it creeps up to its speed for 15 s
-and overshoots its targets, and every leg takes 7 s longer."""
-
-_PX4_BATTERY_S: Final = 86_400
-"""For how long its simulator's battery lasts [s], the most that it takes. Its own 60 s would be
-half empty soon after every take-off, and agents that fly a mission with batteries change them for
-that again and again."""
-
 _HEADING_DEG: Final = 0.0
+"""In which they stand; the models of PX4's simulator know no other."""
 
 
 _PARAMETER_FILE: Final = "vehicle.parm"
@@ -122,7 +114,7 @@ class SitlFirmware:
             if self.kind is FirmwareKind.ARDUPILOT:
                 made[uav.id] = self._ardupilot(number, home, speedup, uav)
             else:
-                made[uav.id] = self._px4(number, home, speedup)
+                made[uav.id] = self._px4(number, home, speedup, uav)
         return made
 
     def _ardupilot(
@@ -149,21 +141,23 @@ class SitlFirmware:
         return FirmwareProcess(command, self._folder(number), {}, files, url, number + 1)
 
     def _px4(
-        self, number: int, home: tuple[float, float, float], speedup: float
+        self, number: int, home: tuple[float, float, float], speedup: float, uav: Uav
     ) -> FirmwareProcess:
+        vehicle = PX4_VEHICLES[uav.vehicle]
         lat_deg, lon_deg, alt_m = home
         etc = self.program.parent.parent / "etc"
         startup = "etc/init.d-posix/rcS"  # found through a link that px4 makes in its folder
         environment = {
-            "PX4_SIM_MODEL": "sihsim_quadx",
+            "PX4_SIM_MODEL": vehicle.model,
             "PX4_SIMULATOR": "sihsim",
             "PX4_SIM_SPEED_FACTOR": f"{speedup:g}",
             "PX4_HOME_LAT": f"{lat_deg:.7f}",
             "PX4_HOME_LON": f"{lon_deg:.7f}",
             "PX4_HOME_ALT": f"{alt_m:.2f}",
-            "PX4_PARAM_SIH_KDV": f"{_PX4_DRAG_N_PER_M_S:g}",
-            "PX4_PARAM_SIM_BAT_DRAIN": str(_PX4_BATTERY_S),
+            **{f"PX4_PARAM_{name}": f"{value:g}" for name, value in vehicle.parameters.items()},
         }
+        if uav.turn_radius_m is not None:
+            environment["PX4_PARAM_NAV_LOITER_RAD"] = f"{uav.turn_radius_m:.1f}"
         command = (str(self.program), "-i", str(number), "-d", "-s", startup, str(etc))
         url = f"udpin:127.0.0.1:{_PX4_PORT + number}"
         return FirmwareProcess(command, self._folder(number), environment, {}, url, number + 1)
@@ -231,8 +225,13 @@ def _find_others(
         if vehicle is VehicleKind.COPTER:
             continue
         if kind is FirmwareKind.PX4:
-            problem = f"a {vehicle} is not flown with PX4"
-            raise InputError(Fault("--autopilot", kind, problem, "fly it with ardupilot"))
+            if vehicle not in PX4_VEHICLES:
+                problem = f"a {vehicle} is not flown with PX4"
+                raise InputError(Fault("--autopilot", kind, problem, "fly it with ardupilot"))
+            continue  # of the same program
+        if vehicle not in ARDUPILOT_VEHICLES:
+            problem = f"a {vehicle} is not flown with ArduPilot"
+            raise InputError(Fault("--autopilot", kind, problem, "fly it with px4"))
         if n_uav > kind.most:
             problem = f"{n_uav} UAVs, but at most {kind.most} such vehicles run on one machine"
             raise InputError(Fault("--autopilot", kind, problem, "fly a smaller scenario"))

@@ -54,6 +54,9 @@ class Uav:
     vehicle: VehicleKind = VehicleKind.COPTER
     """What flies, or drives. Of one that cannot stay the acceleration tells its turns
     (swarm.model.vehicles)."""
+    landing_heading_rad: float | None = None
+    """In which it touches down at its start, clockwise from north [rad]; within 0..2π; None of
+    what needs no runway."""
 
     def __post_init__(self) -> None:
         require_id(self.id, "UAV id")
@@ -74,6 +77,11 @@ class Uav:
                 raise ValueError(f"{name} of UAV {self.id} must be within 0..1, not {share}")
         if not TRAITS[self.vehicle].stays and self.acceleration_m_s2 is None:
             raise ValueError(f"how UAV {self.id} turns must be given, as it is a {self.vehicle}")
+        heading_rad = self.landing_heading_rad
+        if (heading_rad is None) is TRAITS[self.vehicle].needs_runway:
+            raise ValueError(f"a landing heading of UAV {self.id} goes with a plane that needs one")
+        if heading_rad is not None and not 0.0 <= heading_rad <= math.tau:
+            raise ValueError(f"landing heading of UAV {self.id} must be within 0..2π")
         require_probabilities(self.success, f"success of UAV {self.id}")
         require_probabilities(self.survival, f"survival of UAV {self.id}")
 

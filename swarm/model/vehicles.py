@@ -3,8 +3,9 @@
 A UAV that names none is a copter. What firmwares make of the kinds, in modes and numbers, stands in
 agent.vehicle.firmware.
 
-Sources: https://ardupilot.org/rover/docs/rover-control-modes.html and
-https://ardupilot.org/plane/docs/quadplane-support.html.
+Sources: https://ardupilot.org/rover/docs/rover-control-modes.html,
+https://ardupilot.org/plane/docs/quadplane-support.html and
+https://docs.px4.io/main/en/flight_modes_fw/.
 """
 
 from __future__ import annotations
@@ -25,6 +26,8 @@ class VehicleKind(StrEnum):
     """A car, or a boat."""
     QUADPLANE = "quadplane"
     """A plane that takes off and lands upright, on rotors of its own."""
+    PLANE = "plane"
+    """A plane that takes off and lands along a runway."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +39,8 @@ class VehicleTraits:
     stays: bool
     """It stops where it is told to. One that cannot passes its target, and waits on a circle
     round it."""
+    needs_runway: bool = False
+    """It takes off the way it stands, and lands in a direction that it must be told."""
     limits: str = ""
     """What it is not flown with, for people."""
 
@@ -55,6 +60,14 @@ TRAITS: Final[Mapping[VehicleKind, VehicleTraits]] = MappingProxyType(
             limits="passes its targets, waits on a circle and lands where it took off alone: not "
             "with lines, zones, bases, separation_m, band_m or [terrain], and not commanded by "
             "missions",
+        ),
+        VehicleKind.PLANE: VehicleTraits(
+            drives=False,
+            stays=False,
+            needs_runway=True,
+            limits="passes its targets, waits on a circle, takes off the way it stands and lands "
+            "along a runway at its start alone: not with lines, zones, bases, separation_m, band_m "
+            "or [terrain], and not commanded by missions",
         ),
     }
 )

@@ -172,6 +172,7 @@ def _uav_of(entry: UavSpec) -> Uav:
         reserve_frac=entry.reserve_frac,
         charge_frac=entry.charge_frac,
         vehicle=entry.vehicle,
+        landing_heading_rad=entry.landing_heading_rad,
     )
 
 

@@ -34,6 +34,7 @@ from swarm.protocol.fields import (
     Count,
     Duration,
     Flag,
+    Heading,
     Height,
     Horizon,
     Id,
@@ -103,6 +104,8 @@ class UavSpec(Checked):
     """Charge of the battery at mission time 0."""
     vehicle: VehicleKind = VehicleKind.COPTER
     """What it is to fly, or drive."""
+    landing_heading_rad: Heading | None = None
+    """In which it touches down at its start, clockwise from north; None: it needs no runway."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -105,10 +105,13 @@ _ABOUT: Mapping[str, Mapping[str, str]] = {
         "kind": "What kind of UAV it is; for people.",
         "acceleration_m_s2": "With which it takes up speed and brakes [m/s²]; a leg then takes "
         "speed / acceleration longer. Absent: speeds change at once.",
-        "vehicle": 'What it is: "copter", "rover" (drives) or "quadplane" (a plane that '
-        "takes off and lands upright). Only a copter goes with separation_m, band_m and [terrain].",
-        "turn_radius_m": "Of a quadplane, instead of acceleration_m_s2: the radius of the circle "
-        "on which it turns, and waits [m].",
+        "vehicle": 'What it is: "copter", "rover" (drives), "quadplane" (a plane that '
+        'takes off and lands upright) or "plane" (which needs a runway). Only a copter goes with '
+        "separation_m, band_m and [terrain].",
+        "landing_heading_deg": "Of a plane: in which it touches down at its start, clockwise from "
+        "north.",
+        "turn_radius_m": "Of a quadplane or plane, instead of acceleration_m_s2: the radius of the "
+        "circle on which it turns, and waits [m].",
         "airspeed_m_s": "Speed through the air [m/s]; more than the wind's. Absent: wind has no "
         "effect on it.",
         "endurance_s": "Airborne time that a full battery gives [s]. Absent: endless.",
@@ -209,6 +212,7 @@ _EXAMPLES: Mapping[tuple[str, str], str] = {
     ("uav", "acceleration_m_s2"): "2.5",
     ("uav", "vehicle"): '"copter"',
     ("uav", "turn_radius_m"): "60.0",
+    ("uav", "landing_heading_deg"): "90.0",
     ("uav", "airspeed_m_s"): "12.0",
     ("uav", "endurance_s"): "1200.0",
     ("uav", "reserve_frac"): "0.2",

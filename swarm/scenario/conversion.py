@@ -5,6 +5,7 @@ Leaves out: every check, and which lines areas are cut into (swarm.scenario.area
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -81,6 +82,7 @@ def _uav(uav: UavTable, origin: Origin | None) -> Uav:
         reserve_frac=uav.reserve_frac,
         charge_frac=uav.charge_frac,
         vehicle=uav.vehicle,
+        landing_heading_rad=_heading_rad(uav),
     )
 
 
@@ -88,6 +90,11 @@ def _acceleration_m_s2(uav: UavTable) -> float | None:
     if uav.turn_radius_m is None:
         return uav.acceleration_m_s2
     return turning_acceleration_m_s2(uav.speed_m_s, uav.turn_radius_m)
+
+
+def _heading_rad(uav: UavTable) -> float | None:
+    heading_deg = uav.landing_heading_deg
+    return None if heading_deg is None else math.radians(heading_deg)
 
 
 def _base(base: BaseTable, origin: Origin | None) -> Base:

@@ -22,6 +22,7 @@ NEW_KEYS: Mapping[str, Sequence[str]] = {
         "charge_frac",
         "vehicle",
         "turn_radius_m",
+        "landing_heading_deg",
     ),
     "task": ("due_s", "opens_s", "closes_s", "path_m", "path", "trigger_m", "height_m"),
 }

@@ -173,6 +173,7 @@ class UavTable(_Placed):
     charge_frac: _Share = 1.0
     vehicle: Annotated[VehicleKind, Field(strict=False)] = VehicleKind.COPTER
     turn_radius_m: _Distance | None = None
+    landing_heading_deg: Annotated[float, Field(ge=0.0, le=360.0)] | None = None
 
 
 class BaseTable(_Placed):
@@ -329,6 +330,7 @@ _RIGHT: Mapping[tuple[str, ...], str] = {
     ("uav", "endurance_s"): "a number > 0 and <= 1e9 [s], such as endurance_s = 1200.0",
     ("uav", "vehicle"): f"one of {', '.join(map(repr, map(str, VehicleKind)))}",
     ("uav", "turn_radius_m"): "the radius of its circles within 0.1..1e6 [m], such as 60.0",
+    ("uav", "landing_heading_deg"): "a direction within 0..360, clockwise from north, such as 90.0",
     ("uav", "reserve_frac"): _SHARE,
     ("uav", "charge_frac"): _SHARE,
     ("base",): "one table [[base]] per base",

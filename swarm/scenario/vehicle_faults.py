@@ -24,6 +24,14 @@ def table_faults(scenario: Scenario) -> Iterator[Finding]:
         elif uav.turn_radius_m is None:
             problem = f"is missing, and a {uav.vehicle} waits on a circle"
             yield Finding(place, problem, "give its radius, such as 60.0")
+        place = ("uav", index, "landing_heading_deg")
+        if TRAITS[uav.vehicle].needs_runway:
+            if uav.landing_heading_deg is None:
+                problem = f"is missing, and a {uav.vehicle} lands along a runway"
+                yield Finding(place, problem, "give the direction in which it is to touch down")
+        elif uav.landing_heading_deg is not None:
+            problem = f"does not matter to a {uav.vehicle}, which lands upright"
+            yield Finding(place, problem, "leave it out")
 
 
 def vehicle_faults(mission: Mission, scenario: Scenario) -> Iterator[Finding]:
@@ -43,7 +51,7 @@ def vehicle_faults(mission: Mission, scenario: Scenario) -> Iterator[Finding]:
         if TRAITS[uav.vehicle].stays:
             continue
         if mission.bases:
-            problem = f"a {uav.vehicle} lands where it took off, and not at a [[base]]"
+            problem = f"a {uav.vehicle} lands where it started, and not at a [[base]]"
             yield Finding(place, problem, "leave the bases out, or give a copter")
         if mission.zones:
             problem = f"a {uav.vehicle} turns beside its way, perhaps in a [[zone]]"

@@ -7,6 +7,7 @@ hold is written in it, so that older releases read it.
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, fields
@@ -124,9 +125,15 @@ def _kind(uav: Uav) -> dict[str, object]:
     known = {
         "vehicle": None if uav.vehicle is VehicleKind.COPTER else str(uav.vehicle),
         "turn_radius_m": None if uav.turn_radius_m is None else float(f"{uav.turn_radius_m:.12g}"),
+        "landing_heading_deg": _landing_heading_deg(uav),
         "acceleration_m_s2": uav.acceleration_m_s2 if uav.turn_radius_m is None else None,
     }
     return {key: value for key, value in known.items() if value is not None}
+
+
+def _landing_heading_deg(uav: Uav) -> float | None:
+    heading_rad = uav.landing_heading_rad
+    return None if heading_rad is None else float(f"{math.degrees(heading_rad):.12g}")
 
 
 def _base_lines(base: Base) -> Iterator[str]:

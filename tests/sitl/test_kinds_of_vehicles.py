@@ -1,8 +1,8 @@
-"""A rover and a QuadPlane behind the bridge, and in a fleet with a copter.
+"""A rover, a QuadPlane and a plane behind the bridge, and in fleets with a copter.
 
-In exact virtual time with the simulated autopilots; and a whole run of `roundup`, in which real
-firmware drives and flies where SWARM_SITL_ARDUCOPTER, SWARM_SITL_ROVER and SWARM_SITL_PLANE say
-where it is, else the simulated autopilots.
+In exact virtual time with the simulated autopilots; and whole runs of `roundup` and `airstrip`, in
+which real firmware drives and flies where SWARM_SITL_ARDUCOPTER, SWARM_SITL_ROVER and
+SWARM_SITL_PLANE, or SWARM_SITL_PX4, say where it is, else the simulated autopilots.
 """
 
 from __future__ import annotations
@@ -26,6 +26,7 @@ from agent.core.interface import (
     Prepare,
     Refused,
     Return,
+    Runway,
     Swap,
     Swapped,
     VehicleReady,
@@ -35,6 +36,7 @@ from sim.autopilot.config import ServedBase, VehicleConfig
 from sim.autopilot.firmware import FirmwareModelName, firmware_model
 from sim.autopilot.flight import FlightMode
 from sim.fleet.ardupilot_vehicles import ARDUPILOT_VEHICLES
+from sim.fleet.firmware import FirmwareKind
 from swarm.model.vehicles import VehicleKind
 from swarm.scenario import load_scenario
 from swarm.scenario.files import resolve_scenario
@@ -45,22 +47,46 @@ from tests.sitl.test_bridge_autopilot import CONFIG, HOME_M, VEHICLE, JoinedFlig
 pytestmark = pytest.mark.sitl
 
 CIRCLE_M, ON_CIRCLE_M = 60.0, 60.0 * 1.15 + 0.1
+EASTWARDS_RAD = math.pi / 2.0
+FLAVOURS = {
+    VehicleKind.ROVER: FirmwareModelName.ARDUPILOT,
+    VehicleKind.QUADPLANE: FirmwareModelName.ARDUPILOT,
+    VehicleKind.PLANE: FirmwareModelName.PX4,
+}
 VEHICLES = {
     VehicleKind.ROVER: replace(VEHICLE, vehicle=VehicleKind.ROVER, acceleration_m_s2=1.0),
     VehicleKind.QUADPLANE: replace(VEHICLE, vehicle=VehicleKind.QUADPLANE, circle_m=CIRCLE_M),
+    VehicleKind.PLANE: replace(
+        VEHICLE,
+        vehicle=VehicleKind.PLANE,
+        cruise_m_s=20.0,
+        circle_m=CIRCLE_M,
+        heading_rad=EASTWARDS_RAD,
+    ),
 }
 STARTS = {
     VehicleKind.ROVER: Prepare(HOME_M, 4.0, ground_up_m=0.0, vehicle=VehicleKind.ROVER),
     VehicleKind.QUADPLANE: Prepare(
         (*HOME_M[:2], 30.0), 20.0, ground_up_m=0.0, vehicle=VehicleKind.QUADPLANE
     ),
+    VehicleKind.PLANE: Prepare(
+        (*HOME_M[:2], 30.0),
+        20.0,
+        ground_up_m=0.0,
+        vehicle=VehicleKind.PLANE,
+        runway=Runway(HOME_M, EASTWARDS_RAD),
+    ),
 }
 KINDS = pytest.mark.parametrize("kind", list(VEHICLES))
-FAR = {VehicleKind.ROVER: (5.0, 80.0, 0.0), VehicleKind.QUADPLANE: (5.0, 900.0, 30.0)}
+FAR = {
+    VehicleKind.ROVER: (5.0, 80.0, 0.0),
+    VehicleKind.QUADPLANE: (5.0, 900.0, 30.0),
+    VehicleKind.PLANE: (5.0, 900.0, 30.0),
+}
 
 
 def joined(kind: VehicleKind, vehicle: VehicleConfig | None = None) -> JoinedFlight:
-    flavour = firmware_model(FirmwareModelName.ARDUPILOT, kind)
+    flavour = firmware_model(FLAVOURS[kind], kind)
     return JoinedFlight(CONFIG, flavour, vehicle or VEHICLES[kind])
 
 
@@ -126,7 +152,7 @@ def test_it_is_stopped_and_goes_on(kind: VehicleKind) -> None:
     flight.to_bridge(Hold("the operator says so"))
     flight.run_until(Held())
     flight.wait(60.0)
-    stays_m = ON_CIRCLE_M if kind is VehicleKind.QUADPLANE else 10.0
+    stays_m = 10.0 if kind is VehicleKind.ROVER else ON_CIRCLE_M
     assert away_m(flight, here_m) <= stays_m
     flight.to_bridge(replace(STARTS[kind], resume=True))
     flight.run_until(VehicleReady())
@@ -167,7 +193,7 @@ def test_another_kind_than_the_scenarios_is_not_started(kind: VehicleKind) -> No
 
 @KINDS
 def test_it_is_not_commanded_by_missions(kind: VehicleKind) -> None:
-    flavour = firmware_model(FirmwareModelName.ARDUPILOT, kind)
+    flavour = firmware_model(FLAVOURS[kind], kind)
     flight = JoinedFlight(replace(CONFIG, command=CommandStyle.MISSION), flavour, VEHICLES[kind])
     flight.to_bridge(STARTS[kind])
     flight.wait(20.0)
@@ -207,7 +233,84 @@ def test_a_rover_changes_its_battery_at_a_base() -> None:
     assert away_m(flight, (5.0, 60.0, 0.0)) <= 1.0
 
 
+# -- a plane that needs a runway ---------------------------------------------------------
+
+
+def test_a_plane_takes_off_the_way_it_stands_and_lands_along_its_runway() -> None:
+    flight = started(VehicleKind.PLANE)
+    low_m = [at for at in flight.track_enu_m if 0.0 < at[2] < 29.0]
+    assert all(at[1] == pytest.approx(HOME_M[1]) and at[0] > HOME_M[0] for at in low_m)
+    flight.to_bridge(GoTo(1, FAR[VehicleKind.PLANE]))
+    flight.run_until(Arrived(1))
+    seen = len(flight.track_enu_m)
+    flight.to_bridge(Return("done", via_enu_m=(*HOME_M[:2], 30.0)))
+    flight.run_until(Home())
+    assert not flight.vehicle.pilot.armed
+    assert away_m(flight, HOME_M) <= 0.1
+    *_, before, _ = (at for at in flight.track_enu_m[seen:] if 1.0 < at[2] < 20.0)
+    assert before[1] == pytest.approx(HOME_M[1], abs=0.1)
+    assert before[0] < HOME_M[0]
+
+
+def test_no_target_is_told_before_a_plane_flies_steadily() -> None:
+    flight = joined(VehicleKind.PLANE)
+    flight.to_bridge(STARTS[VehicleKind.PLANE])
+    pilot = flight.vehicle.pilot
+    while pilot.mode is not FlightMode.TAKEOFF:
+        flight.wait(0.5)
+    while pilot.mode is FlightMode.TAKEOFF:
+        flight.wait(0.5)
+    flight.wait(8.0)
+    assert flight.waits_for == "letting it fly steadily after takeoff"
+    assert away_m(flight, HOME_M) > CIRCLE_M
+    flight.run_until(VehicleReady())
+
+
+def test_the_landing_stands_on_a_plane_whatever_becomes_of_its_agent() -> None:
+    flight = started(VehicleKind.PLANE)
+    flight.to_bridge(GoTo(1, FAR[VehicleKind.PLANE]))
+    flight.run_until(Arrived(1))
+    pilot = flight.vehicle.pilot
+    pilot.set_mode(FlightMode.RTL, flight.now_s)
+    flight.wait(240.0)
+    assert not pilot.armed
+    assert away_m(flight, HOME_M) <= 0.1
+
+
+def test_a_plane_that_would_circle_over_home_for_good_is_not_started() -> None:
+    flight = joined(VehicleKind.PLANE)
+    flight.wait(5.0)
+    table = flight.vehicle.pilot.parameters
+    table.write("RTL_TYPE", 0.0)
+    flight.to_bridge(STARTS[VehicleKind.PLANE])
+    flight.wait(20.0)
+    table.write("RTL_TYPE", 3.0)
+    flight.wait(20.0)
+    said = "RTL_TYPE is 3, so it may circle over home for good: set RTL_TYPE 1"
+    assert flight.waits_for == said
+    assert not flight.vehicle.pilot.armed
+    table.write("RTL_TYPE", 1.0)
+    flight.run_until(VehicleReady())
+
+
 # -- a fleet of all kinds ---------------------------------------------------------------
+
+
+def flown(scenario: Path, autopilot: str, speedup: float, tmp_path: Path) -> dict[str, list[str]]:
+    """Who has done what of a scenario, all of which must have been done."""
+    words = [str(scenario), "--speedup", f"{speedup:g}", "--autopilot", autopilot]
+    with SwarmRun(words, tmp_path) as run:
+        status, told = run.result(timeout_s=590.0)
+        run.assert_nothing_left()
+        story = run.story()
+    assert status == 0, story
+    assert sorted(told["done"]) == sorted(task.id for task in load_scenario(scenario).tasks), story
+    assert told["lost_uavs"] == [], story
+    assert told["processes"] == [], story
+    return {
+        uav: sorted({task.partition("-")[0] for task in tasks})
+        for uav, tasks in told["executed_routes"].items()
+    }
 
 
 def test_copter_rover_and_plane_share_a_mission(
@@ -215,17 +318,17 @@ def test_copter_rover_and_plane_share_a_mission(
 ) -> None:
     real = all(os.environ.get(vehicle.variable) for vehicle in ARDUPILOT_VEHICLES.values())
     record_property("flown", "real" if real else "simulated")
-    scenario = resolve_scenario("roundup")
-    words = ["--autopilot", "ardupilot" if real else "sim"]
-    speedup = 2.0 if real else pace(10.0)
-    with SwarmRun([str(scenario), "--speedup", f"{speedup:g}", *words], tmp_path) as run:
-        status, told = run.result(timeout_s=400.0)
-        run.assert_nothing_left()
-        story = run.story()
-    assert status == 0, story
-    assert sorted(told["done"]) == sorted(task.id for task in load_scenario(scenario).tasks), story
-    assert told["lost_uavs"] == [], story
-    assert told["processes"] == [], story
-    by_uav = told["executed_routes"]
-    assert {task.partition("-")[0] for task in by_uav["rover"]} == {"trough"}, story
-    assert {task.partition("-")[0] for task in by_uav["plane"]} == {"herd"}, story
+    autopilot, speedup = ("ardupilot", 2.0) if real else ("sim", pace(10.0))
+    did = flown(resolve_scenario("roundup"), autopilot, speedup, tmp_path)
+    assert did["rover"] == ["trough"]
+    assert did["plane"] == ["herd"]
+
+
+def test_copter_and_plane_share_a_mission_and_the_plane_lands_on_its_strip(
+    tmp_path: Path, record_property: Callable[[str, object], None]
+) -> None:
+    real = bool(os.environ.get(FirmwareKind.PX4.variable))
+    record_property("flown", "real" if real else "simulated")
+    autopilot, speedup = ("px4", 1.0) if real else ("sim-px4", pace(10.0))
+    did = flown(resolve_scenario("airstrip"), autopilot, speedup, tmp_path)
+    assert did == {"copter": ["roof"], "plane": ["field"]}

@@ -6,6 +6,7 @@ from agent.vehicle.firmware.ardupilot import ArduCopter
 from agent.vehicle.firmware.ardurover import ArduRover
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.firmware.px4 import Px4Copter
+from agent.vehicle.firmware.px4_plane import Px4Plane
 from agent.vehicle.firmware.quadplane import QuadPlane
 from agent.vehicle.messages import Heartbeat
 
@@ -17,7 +18,8 @@ __all__ = ["firmware_of", "unsupported"]
 
 def firmware_of(heartbeat: Heartbeat) -> Firmware | None:
     """The firmware that flies the vehicle of that heartbeat; None if it is none of ours."""
-    firmwares: tuple[Firmware, ...] = (ArduCopter(), ArduRover(), QuadPlane(), Px4Copter())
+    ardupilots: tuple[Firmware, ...] = (ArduCopter(), ArduRover(), QuadPlane())
+    firmwares: tuple[Firmware, ...] = (*ardupilots, Px4Copter(), Px4Plane())
     return next((firmware for firmware in firmwares if firmware.flies(heartbeat)), None)
 
 

@@ -110,18 +110,23 @@ def quadplane_failsafes(values: Mapping[str, float], own_system_id: int) -> Fail
     return Failsafes(True, _after("returns", values.get("FS_LONG_TIMEOUT")), "", battery)
 
 
-def px4_failsafes(values: Mapping[str, float]) -> Failsafes:
-    """The failsafes of a PX4 whose parameters have these values, as far as they are known."""
+def px4_failsafes(values: Mapping[str, float], waits: str = "hovers") -> Failsafes:
+    """The failsafes of a PX4 whose parameters have these values, as far as they are known.
+
+    Args:
+        values: of its parameters.
+        waits: what it does where it is told nothing.
+    """
     battery = _battery("COM_LOW_BAT_ACT", values)
     action = values.get("NAV_DLL_ACT")
     remedy = "set NAV_DLL_ACT 2"
     if action not in (_RETURNS, _LANDS):
-        does = "hovers" if action in (None, 0, _HOLDS) else "falls"
+        does = waits if action in (None, 0, _HOLDS) else "falls"
         return _stays(does, "NAV_DLL_ACT", action, remedy, battery)
     # Versions that know no exceptions make none.
     excepted = values.get("COM_DLL_EXCEPT", 0.0)
     if int(excepted) & _HOLD_EXCEPTED:
-        return _stays("hovers", "COM_DLL_EXCEPT", excepted, "set COM_DLL_EXCEPT 0", battery)
+        return _stays(waits, "COM_DLL_EXCEPT", excepted, "set COM_DLL_EXCEPT 0", battery)
     does = "lands" if action == _LANDS else "returns"
     return Failsafes(True, _after(does, values.get("COM_DL_LOSS_T")), "", battery)
 

@@ -99,6 +99,12 @@ ARDUROVER_LIMITS: Final = (
 QUADPLANE_LIMITS: Final = (LimitParameter(LegLimit.CIRCLE, "WP_LOITER_RAD"),)
 """To the left where it is negative."""
 
+PX4_PLANE_LIMITS: Final = (
+    LimitParameter(LegLimit.CIRCLE, "NAV_LOITER_RAD"),
+    LimitParameter(LegLimit.SPEED, "FW_AIRSPD_MAX"),
+)
+"""Of the speed, through the air."""
+
 JerkCost = Callable[[float, float, float], float]
 """Time [s] of a leg beyond d/v + v/a, of speed [m/s], acceleration [m/s²] and jerk [m/s³]."""
 
@@ -225,3 +231,9 @@ def quadplane_kinematics(values: Mapping[str, float]) -> Kinematics:
     """Of a QuadPlane, by the radius of its circles."""
     radii_m = {name: abs(value) for name, value in values.items()}
     return kinematics_of(QUADPLANE_LIMITS, radii_m, no_jerk_s)
+
+
+def px4_plane_kinematics(values: Mapping[str, float]) -> Kinematics:
+    """Of a PX4 on wings, by the radius of its circles."""
+    radii_m = {name: abs(value) for name, value in values.items()}
+    return kinematics_of(PX4_PLANE_LIMITS, radii_m, no_jerk_s)

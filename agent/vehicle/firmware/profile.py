@@ -16,6 +16,7 @@ from agent.vehicle.commands import result_text
 from agent.vehicle.firmware.failsafes import Failsafes
 from agent.vehicle.firmware.fences import POLYGONS, FenceSetup
 from agent.vehicle.firmware.kinematics import Kinematics, LimitParameter
+from agent.vehicle.landing_pattern import RunwayLanding
 from agent.vehicle.messages import (
     AltitudeFrame,
     CommandInt,
@@ -73,6 +74,10 @@ class Firmware(ABC):
     """For people."""
     takes_missions: ClassVar[bool] = True
     """Whether it is known how to command it by missions."""
+    steadies_s: ClassVar[float] = 0.0
+    """For how long it is told no target once it has taken off."""
+    landing_names: ClassVar[tuple[str, ...]] = ()
+    """Parameters that say how it lands along a runway."""
     stops_within_m: ClassVar[float] = 0.0
     """How far from a target it may stop for good; 0: at it."""
     disarms_itself: ClassVar[bool] = True
@@ -226,6 +231,14 @@ class Firmware(ABC):
         """Whether the text says that a fence that stands on the vehicle is not heeded."""
         del text
         return False
+
+    def runway_landing(self, values: Mapping[str, float]) -> RunwayLanding | str:
+        """How it lands along a runway, as these parameters say; or why it would not, in words.
+
+        Of what needs a runway alone.
+        """
+        del values
+        return f"a {self.kind} lands upright"
 
     # What it is told.
 

@@ -1,6 +1,6 @@
-"""PX4's multicopters, as PX4 1.17 behaves.
+"""PX4, and its multicopters, as PX4 1.17 behaves.
 
-Leaves out: planes, VTOL and rovers, which take off and hold otherwise.
+Leaves out: planes (agent.vehicle.firmware.px4_plane), VTOL and rovers.
 
 Sources: https://docs.px4.io/main/en/flight_modes_mc/ for what the modes do, and
 https://mavlink.io/en/messages/common.html for the commands; how they are acknowledged
@@ -45,8 +45,8 @@ _WAYPOINT_RADIUS_M = 2.0
 """As ArduCopter's, within which a vehicle is as good as at its waypoint."""
 
 
-class Px4Copter(Firmware):
-    """The firmware of PX4's multicopters."""
+class Px4(Firmware):
+    """What PX4 does whatever it flies."""
 
     autopilot = 12
     name = "PX4"
@@ -88,13 +88,7 @@ class Px4Copter(Firmware):
     return_mode = _RTL
     land_mode = _LAND
     returning_modes = frozenset({_RTL, _LAND, _PRECLAND})
-    speed_parameters = (SpeedParameter("MPC_XY_CRUISE", 1.0),)
-    """[m/s]; it also survives a restart of the vehicle."""
-    override_spec = OverrideSpec(("MPC_JERK_AUTO",), 20.0)
-    """[m/s³] PX4 brakes so early that the jerk, 4 by default, costs ever more time the nearer the
-    target is; agent.vehicle.firmware.kinematics has the formula."""
     failsafe_names = PX4_NAMES
-    limit_parameters = PX4_LIMITS
     fence_names = PX4_FENCE_NAMES
     streams = ((1, SystemStatus), (230, EkfStatus), (245, ExtendedState))
     """What comes too seldom unasked. EKF_STATUS_REPORT does not exist, and MISSION_CURRENT streams
@@ -157,10 +151,6 @@ class Px4Copter(Firmware):
         del own_system_id
         return px4_failsafes(values)
 
-    def kinematics(self, values: Mapping[str, float]) -> Kinematics:
-        """As it flies to targets and by missions."""
-        return px4_kinematics(values)
-
     def fence_setup(self, values: Mapping[str, float]) -> FenceSetup:
         """Polygons are heeded wherever anything is done about fences."""
         return px4_fence(values)
@@ -197,3 +187,18 @@ class Px4Copter(Firmware):
     def waypoint_params(self, hold_s: float) -> tuple[float, float, float, float]:
         """The hold begins within a radius of 10 m (NAV_ACC_RAD) unless told another."""
         return (hold_s, _WAYPOINT_RADIUS_M, 0.0, math.nan)
+
+
+class Px4Copter(Px4):
+    """The firmware of PX4's multicopters."""
+
+    speed_parameters = (SpeedParameter("MPC_XY_CRUISE", 1.0),)
+    """[m/s]; it also survives a restart of the vehicle."""
+    override_spec = OverrideSpec(("MPC_JERK_AUTO",), 20.0)
+    """[m/s³] PX4 brakes so early that the jerk, 4 by default, costs ever more time the nearer the
+    target is; agent.vehicle.firmware.kinematics has the formula."""
+    limit_parameters = PX4_LIMITS
+
+    def kinematics(self, values: Mapping[str, float]) -> Kinematics:
+        """As it flies to targets and by missions."""
+        return px4_kinematics(values)

@@ -25,8 +25,10 @@ class FirmwareModelName(StrEnum):
 
 SIMULATED: Final[Mapping[FirmwareModelName, frozenset[VehicleKind]]] = MappingProxyType(
     {
-        FirmwareModelName.ARDUPILOT: frozenset(VehicleKind),
-        FirmwareModelName.PX4: frozenset({VehicleKind.COPTER}),
+        FirmwareModelName.ARDUPILOT: frozenset(
+            {VehicleKind.COPTER, VehicleKind.ROVER, VehicleKind.QUADPLANE}
+        ),
+        FirmwareModelName.PX4: frozenset({VehicleKind.COPTER, VehicleKind.PLANE}),
     }
 )
 """Which kinds of vehicles there are of each."""
@@ -43,7 +45,8 @@ def check_simulated(
     for vehicle in vehicles:
         if vehicle not in SIMULATED[name]:
             problem = f"no {vehicle} is simulated with that firmware"
-            remedy = f"take {FirmwareModelName.ARDUPILOT}'s, or make it a copter"
+            have = [each for each in FirmwareModelName if vehicle in SIMULATED[each]]
+            remedy = f"take {' or '.join(have)}, or make it a copter"
             raise InputError(Fault(source, name, problem, remedy))
 
 
@@ -61,10 +64,13 @@ def firmware_model(
     from sim.autopilot.firmware.ardupilot import ArduCopterModel
     from sim.autopilot.firmware.ardurover import ArduRoverModel
     from sim.autopilot.firmware.px4 import Px4Model
+    from sim.autopilot.firmware.px4_plane import Px4PlaneModel
     from sim.autopilot.firmware.quadplane import QuadPlaneModel
 
     if vehicle is VehicleKind.ROVER:
         return ArduRoverModel()
     if vehicle is VehicleKind.QUADPLANE:
         return QuadPlaneModel()
+    if vehicle is VehicleKind.PLANE:
+        return Px4PlaneModel()
     return Px4Model() if name == FirmwareModelName.PX4 else ArduCopterModel()

@@ -14,7 +14,7 @@ from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from agent.vehicle.firmware.kinematics import JerkCost
 from sim.autopilot.config import VehicleConfig
 from sim.autopilot.events import FirmwareEvent, OwnCommand, TextTemplate
-from sim.autopilot.flight import FlightMode
+from sim.autopilot.flight import FlightMode, RunwayPlaces
 from sim.autopilot.parameters import (
     ENDLESS,
     ParameterBehaviour,
@@ -111,6 +111,8 @@ class MissionBehaviour:
     """Whether the trigger of a camera is that of another component: an item for it is told on, and
     as reached; a command for it is left to that component, and not acknowledged. Items for regions
     of interest are told on, too, and acknowledged to who commands one."""
+    lands_on_runways: bool = False
+    """Whether it knows where a landing begins, and a circle on which to come down for it."""
     forgets_mode: bool = False
     """Whether the mode becomes another one at the end, or at an item that returns home."""
 
@@ -270,6 +272,11 @@ class FirmwareModel(ABC):
         """The mode of that number; None where the firmware, or its simulation, has none."""
         mode, _ = self.mode_names.get(custom_mode & self.custom_mode_bits, (None, ""))
         return mode
+
+    def landing_enu_m(self, pilot: Pilot) -> RunwayPlaces | None:
+        """Where its return mode lands along a runway [m]; None: it does not."""
+        del pilot
+        return None
 
     def disarm_delay(self, mode: FlightMode) -> ParameterRole | None:
         """What says how long after landing the motors stop; None where that is at once."""

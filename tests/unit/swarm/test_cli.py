@@ -158,10 +158,10 @@ def test_command_that_returns_no_status_is_a_bug() -> None:
         (["plan", SCENARIO, "--time-limit-s", "nan"], ("swarm plan: invalid value for "
          "'--time-limit-s': Input should be greater than or equal to 0; SEE")),
         (["plan", "no/such.toml"], ("no/such.toml: no such scenario file; give a file or a "
-         "shipped scenario: hayfield, meadow, orchard, reservoir-inspection, ridge, roundup, "
-         "table-1, valley-popups, valley-survey, vineyard")),
+         "shipped scenario: airstrip, hayfield, meadow, orchard, reservoir-inspection, ridge, "
+         "roundup, table-1, valley-popups, valley-survey, vineyard")),
         (["plan", "table1"], ("table1: no such scenario file; did you mean 'table-1'? Shipped "
-         "scenarios: hayfield, meadow, orchard, reservoir-inspection, ridge, roundup, table-1, "
+         "scenarios: airstrip, hayfield, meadow, orchard, reservoir-inspection, ridge, roundup, table-1, "
          "valley-popups, valley-survey, vineyard")),
         (["task"], "swarm task: missing command; SEE"),
         (["task", "ad"], "swarm task: no such command 'ad'; did you mean 'add'? SEE"),

@@ -9,7 +9,10 @@ import pytest
 from agent.vehicle.firmware import firmware_of, unsupported
 from agent.vehicle.firmware.ardupilot import ArduCopter
 from agent.vehicle.firmware.ardurover import ArduRover
+from agent.vehicle.firmware.px4 import Px4Copter
+from agent.vehicle.firmware.px4_plane import Px4Plane
 from agent.vehicle.firmware.quadplane import QuadPlane
+from agent.vehicle.landing_pattern import RunwayLanding
 from agent.vehicle.messages import Heartbeat
 from swarm.model.vehicles import TRAITS, VehicleKind
 
@@ -54,9 +57,12 @@ def test_ardupilot_is_told_by_its_kind_of_vehicle(vehicle_type: int, kind: type 
     assert (None if found is None else type(found)) is kind
 
 
-@pytest.mark.parametrize("vehicle_type", [1, 10, 11, 20, 22])
-def test_px4_flies_multicopters_alone(vehicle_type: int) -> None:
-    assert firmware_of(heartbeat(vehicle_type, PX4)) is None
+@pytest.mark.parametrize(
+    ("vehicle_type", "kind"), [(2, Px4Copter), (1, Px4Plane), (10, None), (20, None), (22, None)]
+)
+def test_px4_is_told_by_its_kind_of_vehicle(vehicle_type: int, kind: type | None) -> None:
+    found = firmware_of(heartbeat(vehicle_type, PX4))
+    assert (None if found is None else type(found)) is kind
 
 
 def test_a_plane_that_tells_no_rotors_is_told_what_to_set() -> None:
@@ -89,6 +95,53 @@ def test_a_rover_has_no_takeoff_to_tell() -> None:
 def test_a_plane_is_told_a_speed_through_the_air() -> None:
     assert PLANE.change_speed(20.0).params[:2] == (0.0, 20.0)
     assert ROVER.change_speed(3.0).params[:2] == (1.0, 3.0)
+
+
+# -- along a runway --------------------------------------------------------------------
+
+
+def test_a_plane_lands_as_its_parameters_say() -> None:
+    landing = Px4Plane().runway_landing(
+        {"RTL_TYPE": 1.0, "FW_LND_ANG": 5.0, "NAV_LOITER_RAD": -80.0}
+    )
+    assert landing == RunwayLanding(80.0, math.radians(5.0))
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({}, "RTL_TYPE is not known, so it may circle over home for good: set RTL_TYPE 1"),
+        ({"RTL_TYPE": 3.0}, "RTL_TYPE is 3, so it may circle"),
+        ({"RTL_TYPE": 1.0, "NAV_LOITER_RAD": 80.0}, "FW_LND_ANG is not known"),
+        ({"RTL_TYPE": 1.0, "NAV_LOITER_RAD": 80.0, "FW_LND_ANG": 60.0}, "not within 1..15"),
+        ({"RTL_TYPE": 1.0, "FW_LND_ANG": 5.0}, "NAV_LOITER_RAD is not known, or 0"),
+    ],
+)
+def test_a_plane_of_which_it_is_not_known_how_it_lands_has_no_landing(
+    values: dict[str, float], says: str
+) -> None:
+    told = Px4Plane().runway_landing(values)
+    assert isinstance(told, str)
+    assert says in told
+
+
+def test_what_lands_upright_has_no_runway() -> None:
+    assert PLANE.runway_landing(FINE) == "a quadplane lands upright"
+
+
+def test_a_px4_plane_circles_without_its_agent_unless_it_is_set_to_return() -> None:
+    circles = Px4Plane().failsafes({"NAV_DLL_ACT": 0.0, "COM_LOW_BAT_ACT": 3.0}, 255)
+    assert circles.agent_lost == "circles (NAV_DLL_ACT is 0)"
+    assert Px4Plane().failsafes({"NAV_DLL_ACT": 2.0, "COM_LOW_BAT_ACT": 3.0}, 255).comes_home
+
+
+def test_a_px4_plane_turns_on_its_circle_and_is_no_faster_than_it_can() -> None:
+    limits = Px4Plane().kinematics({"NAV_LOITER_RAD": 80.0, "FW_AIRSPD_MAX": 20.0})
+    acceleration_m_s2 = limits.leg_acceleration_m_s2(12.0)
+    assert acceleration_m_s2 is not None
+    assert 12.0 / acceleration_m_s2 == pytest.approx(80.0 / 12.0)
+    assert limits.speed is not None
+    assert limits.speed.value == 20.0
 
 
 # -- without an agent ------------------------------------------------------------------

@@ -132,15 +132,82 @@ def test_only_what_cannot_stay_has_a_circle_and_flies_in_still_air() -> None:
 
 def test_vehicles_of_a_fleet_are_what_the_scenario_says() -> None:
     fleet = fleet_of(load_scenario(resolve_scenario("roundup")))
-    assert [each.config.vehicle for each in fleet] == list(VehicleKind)
+    assert [each.config.vehicle for each in fleet] == [VehicleKind.COPTER, ROVER, PLANE]
     assert [each.config.circle_m for each in fleet][:2] == [None, None]
     assert fleet[2].config.circle_m == pytest.approx(60.0)
     assert fleet[2].config.acceleration_m_s2 is None
 
 
-def test_px4_has_copters_alone() -> None:
-    assert SIMULATED[FirmwareModelName.PX4] == {VehicleKind.COPTER}
+def test_a_plane_on_a_strip_stands_in_the_direction_of_its_landing() -> None:
+    fleet = fleet_of(load_scenario(resolve_scenario("airstrip")))
+    assert [each.config.vehicle for each in fleet] == [VehicleKind.COPTER, VehicleKind.PLANE]
+    assert fleet[1].config.heading_rad == 0.0
+
+
+def test_each_kind_is_simulated_with_some_firmware() -> None:
+    assert SIMULATED[FirmwareModelName.PX4] == {VehicleKind.COPTER, VehicleKind.PLANE}
+    assert frozenset().union(*SIMULATED.values()) == frozenset(VehicleKind)
+    with pytest.raises(InputError, match="no plane is simulated with that firmware; take px4"):
+        check_simulated(FirmwareModelName.ARDUPILOT, [VehicleKind.PLANE], "--flavour")
     with pytest.raises(ValueError, match="no rover is simulated with px4"):
         firmware_model(FirmwareModelName.PX4, ROVER)
     with pytest.raises(InputError, match="--flavour: px4: no quadplane is simulated"):
         check_simulated(FirmwareModelName.PX4, [VehicleKind.COPTER, PLANE], "--flavour")
+
+
+# -- a plane that needs a runway --------------------------------------------------------
+
+
+def plane_on_a_strip(**more: float) -> GroundStation:
+    flavour = firmware_model(FirmwareModelName.PX4, VehicleKind.PLANE)
+    found = ground_station(
+        flavour, vehicle=VehicleKind.PLANE, circle_m=80.0, cruise_m_s=12.0, **more
+    )
+    found.wait(12.0)
+    return found
+
+
+def test_a_plane_says_that_it_is_one() -> None:
+    plane = plane_on_a_strip()
+    assert {beat.type for beat in only(plane.heard, "HEARTBEAT")} == {1}
+
+
+def test_its_parameters_are_those_of_planes_in_their_order() -> None:
+    config = VehicleConfig(1, vehicle=VehicleKind.PLANE, circle_m=80.0)
+    names = [
+        each.name
+        for each in firmware_model(FirmwareModelName.PX4, VehicleKind.PLANE).parameters(config)
+    ]
+    assert names == sorted(names)
+    assert {"FW_AIRSPD_TRIM", "NAV_LOITER_RAD", "RTL_TYPE", "FW_LND_ANG"} <= set(names)
+    assert not [name for name in names if name.startswith("MPC_")]
+
+
+def test_without_a_landing_it_circles_over_home_for_good() -> None:
+    plane = plane_on_a_strip()
+    pilot = plane.vehicle.pilot
+    assert pilot.arm(plane.now_s, forced=False)
+    assert pilot.take_off(40.0, plane.now_s)
+    plane.wait(60.0)
+    assert pilot.mode is FlightMode.LOITER
+    pilot.set_mode(FlightMode.RTL, plane.now_s)
+    plane.wait(300.0)
+    assert pilot.armed
+    home_enu_m, place_enu_m = pilot.flight.home_enu_m, pilot.position_enu_m(plane.now_s)
+    assert math.dist(home_enu_m[:2], place_enu_m[:2]) == pytest.approx(80.0, abs=0.1)
+    assert place_enu_m[2] == pytest.approx(100.0)
+
+
+def test_it_lands_where_it_is_round_a_circle() -> None:
+    plane = plane_on_a_strip()
+    pilot = plane.vehicle.pilot
+    assert pilot.arm(plane.now_s, forced=False)
+    assert pilot.take_off(40.0, plane.now_s)
+    plane.wait(60.0)
+    here_enu_m = pilot.position_enu_m(plane.now_s)
+    pilot.set_mode(FlightMode.LAND, plane.now_s)
+    plane.wait(90.0)
+    assert not pilot.armed
+    lies_enu_m = pilot.position_enu_m(plane.now_s)
+    assert lies_enu_m[2] == pytest.approx(0.0, abs=1e-6)
+    assert math.dist(here_enu_m[:2], lies_enu_m[:2]) <= 160.0

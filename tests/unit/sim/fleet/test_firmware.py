@@ -118,6 +118,27 @@ def test_ardupilot_has_a_program_and_a_model_for_each_kind_of_vehicle() -> None:
     assert (plane["Q_ENABLE"], plane["Q_MAV_TYPE"], plane["WP_LOITER_RAD"]) == ("1", "22", "80")
 
 
+def test_px4_has_a_model_for_each_kind_of_vehicle_and_one_program() -> None:
+    plane = replace(
+        uav("u1"),
+        vehicle=VehicleKind.PLANE,
+        speed_m_s=12.0,
+        acceleration_m_s2=turning_acceleration_m_s2(12.0, 80.0),
+        landing_heading_rad=0.0,
+    )
+    fleet = replace(mission([uav("u0"), plane], [task("t0", 1.0)]), origin=ORIGIN)
+    firmware = SitlFirmware(FirmwareKind.PX4, Path("/opt/px4/bin/px4"), Path("/tmp"))
+    copter, flown = (each.environment for each in firmware.processes(fleet, 1.0).values())
+
+    assert [each["PX4_SIM_MODEL"] for each in (copter, flown)] == [
+        "sihsim_quadx",
+        "sihsim_airplane",
+    ]
+    assert flown["PX4_PARAM_NAV_LOITER_RAD"] == "80.0"
+    assert "PX4_PARAM_SIH_KDV" not in flown
+    assert "PX4_PARAM_NAV_LOITER_RAD" not in copter
+
+
 @pytest.mark.parametrize(
     ("kind", "variables", "said"),
     [

@@ -103,7 +103,8 @@ def test_bases_zones_and_windows_in_comments_are_right_when_they_are_taken_in() 
     text = blank_scenario(Blank("field", 1, 1, DEFAULT_ORIGIN))
     commented = re.compile(r"^# (\w+ = |\[\[\w+\]\]$)", re.MULTILINE)
     text = re.sub(
-        r"^# (lat_deg|lon_deg|alt_m|polygon|path|tasks_from|camera|turn_\w+|\w+lap_frac) = .*\n",
+        r"^# (lat_deg|lon_deg|alt_m|polygon|path|tasks_from|camera|turn_\w+|landing_\w+)"
+        r" = .*\n|^# \w+lap_frac = .*\n",
         "",
         text,
         flags=re.MULTILINE,

@@ -23,7 +23,8 @@ from swarm.scenario.files import resolve_scenario, shipped_scenarios
 
 PLAIN = ["meadow", "orchard", "table-1", "valley-popups", "valley-survey"]
 """Those of schema 1."""
-NAMES = sorted([*PLAIN, "hayfield", "reservoir-inspection", "ridge", "roundup", "vineyard"])
+FIELD = ["airstrip", "hayfield", "reservoir-inspection", "ridge", "roundup", "vineyard"]
+NAMES = sorted([*PLAIN, *FIELD])
 
 
 def shipped(name: str) -> Mission:
@@ -217,5 +218,17 @@ def test_roundup_has_a_task_for_every_kind_of_vehicle() -> None:
         for uav in mission.uavs
     }
 
-    assert kinds_of(mission) == tuple(VehicleKind)
+    assert set(kinds_of(mission)) == set(VehicleKind) - {VehicleKind.PLANE}
     assert able == {"copter": {"roof", "herd"}, "rover": {"trough"}, "plane": {"herd"}}
+
+
+def test_airstrip_has_a_plane_with_a_runway_and_tasks_for_it() -> None:
+    mission = shipped("airstrip")
+    able = {
+        uav.id: {task.kind for task in mission.tasks if mission.success(uav, task) > 0.0}
+        for uav in mission.uavs
+    }
+
+    assert kinds_of(mission) == (VehicleKind.COPTER, VehicleKind.PLANE)
+    assert [uav.landing_heading_rad for uav in mission.uavs] == [None, 0.0]
+    assert able == {"copter": {"roof"}, "plane": {"field"}}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import tomllib
 
 import pytest
@@ -51,6 +52,9 @@ kind = "place"
 position_m = [100.0, 0.0]
 value = 1.0
 """
+RUNWAY = TEXT.replace('"quadplane"', '"plane"').replace(
+    "turn_radius_m = 70.0", "turn_radius_m = 70.0\nlanding_heading_deg = 270.0"
+)
 LINE = '[[task]]\nid = "line"\nkind = "row"\nvalue = 1.0\npath_m = [[0.0, 9.0], [90.0, 9.0]]\n'
 BASE = '[[base]]\nid = "b"\nposition_m = [0.0, 50.0]\n'
 ZONE = '[[zone]]\nid = "z"\npolygon_m = [[300.0, 0.0], [310.0, 0.0], [310.0, 10.0]]\n'
@@ -105,6 +109,22 @@ def test_agents_are_told_what_they_fly() -> None:
     assert told[2].turn_radius_m == pytest.approx(70.0)
 
 
+def test_a_runway_is_read_written_and_told_to_its_agent() -> None:
+    read = mission(RUNWAY)
+    assert [uav.landing_heading_rad for uav in read.uavs] == [
+        None,
+        None,
+        pytest.approx(1.5 * math.pi),
+    ]
+    assert mission(format_scenario(read)) == read
+    brief = mission_config_of(read, FlightLayers(), 1)
+    assert fleet_of(brief)[2].landing_heading_rad == read.uavs[2].landing_heading_rad
+    said = encode(Message("mixed", "coordinator", Stamp(1, 1), brief))
+    heard = Codec("mixed").decode("swarm/mixed/brief", said)
+    assert heard is not None
+    assert heard.body == brief
+
+
 def test_first_edition_knows_copters_alone() -> None:
     assert "vehicle and turn_radius_m are of schema 2" in fault(
         TEXT.replace("schema = 2", "schema = 1").replace("acceleration_m_s2 = 1.0\n", "")
@@ -138,8 +158,19 @@ def test_first_edition_knows_copters_alone() -> None:
             TEXT.replace("horizon_s = 500.0", "horizon_s = 500.0\nband_m = [20.0, 90.0]"),
             "a quadplane is not known beside band_m",
         ),
+        (
+            TEXT.replace('"quadplane"', '"plane"'),
+            "landing_heading_deg: is missing, and a plane lands along a runway",
+        ),
+        (
+            TEXT.replace("turn_radius_m = 70.0", "turn_radius_m = 70.0\nlanding_heading_deg = 9.0"),
+            "landing_heading_deg: does not matter to a quadplane, which lands upright",
+        ),
+        (RUNWAY.replace("= 270.0", "= 361.0"), "a direction within 0..360"),
         (TEXT + LINE, "a quadplane flies no lines, such as line"),
-        (TEXT + BASE, "a quadplane lands where it took off"),
+        (TEXT + BASE, "a quadplane lands where it started"),
+        (RUNWAY + BASE, "a plane lands where it started"),
+        (RUNWAY + ZONE, "a plane turns beside its way"),
         (TEXT + ZONE, "a quadplane turns beside its way, perhaps in a [[zone]]"),
     ],
 )
