@@ -30,6 +30,8 @@ from agent.core.station_words import StationAction, StationAsked
 from swarm.bus.port import Bus
 from swarm.protocol.events import Stop
 from swarm.protocol.messages import MissionConfig, Snapshot
+from swarm.protocol.shared_messages import SharedMessages
+from swarm.protocol.sync import some_of
 from swarm.protocol.timing import PRESETS, LinkKind
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import BusError
@@ -158,6 +160,7 @@ async def live_once(
     store: Store | None,
     answer_s: float,
     on_wait: Callable[[str], None],
+    shared: SharedMessages | None = None,
 ) -> int:
     """One life of an agent, from its seat on the bus to its end; the exit status.
 
@@ -172,6 +175,7 @@ async def live_once(
         store: keeps what the core knows for its next life; None: nothing is kept.
         answer_s: how long a question waits for the slowest answer [wall s].
         on_wait: called with the reason whenever there was no seat.
+        shared: as for `run_agent`.
     """
     SERVICE_NOTIFIER.waiting(f"{uav}: looks for the bus")
     seat = await seat_or_stop(open_bus, stop, on_wait)
@@ -183,7 +187,15 @@ async def live_once(
     save = None if store is None else store.save
     try:
         status = await run_agent(
-            core, mission, seat, clock, make_vehicle, stop, save=save, answer_s=answer_s
+            core,
+            mission,
+            seat,
+            clock,
+            make_vehicle,
+            stop,
+            save=save,
+            answer_s=answer_s,
+            shared=shared,
         )
     finally:
         seat.close()
@@ -201,6 +213,7 @@ async def run_agent(
     *,
     save: Callable[[Snapshot], None] | None = None,
     answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
+    shared: SharedMessages | None = None,
 ) -> int:
     """Fly one UAV until the mission has ended and the vehicle is home.
 
@@ -213,11 +226,14 @@ async def run_agent(
         stop: asks to leave early: the vehicle is told to return first, and seen to.
         save: keeps what the core knows for its next life.
         answer_s: how long a question waits for the slowest answer [wall s].
+        shared: what other agents in this process have heard of the mission.
 
     Returns:
         Exit status.
     """
-    flight = _Flight(core, bus, clock, mission, make_vehicle, save=save, answer_s=answer_s)
+    flight = _Flight(
+        core, bus, clock, mission, make_vehicle, save=save, answer_s=answer_s, shared=shared
+    )
     join_mission(bus, mission, core.uav, status=False)
     loop = asyncio.get_running_loop()
     flying = loop.create_task(flight.shell.run())
@@ -252,6 +268,7 @@ class _Flight:
         *,
         save: Callable[[Snapshot], None] | None,
         answer_s: float,
+        shared: SharedMessages | None,
     ) -> None:
         self.vehicle: Vehicle | None = None
         self.starting: asyncio.Task[None] | None = None
@@ -277,6 +294,8 @@ class _Flight:
             answer_s=answer_s,
             together=lambda heard: heard,
             settled=lambda: not core.is_contested,
+            crowd=lambda there: some_of(core.uav, there),
+            shared=shared,
         )
         core.dropped = _Dropped(self.shell)
 

@@ -99,6 +99,7 @@ async def run_coordinator(
         from_bus=lambda fact: fact,
         execute=execute,
         snapshot=core.snapshot,
+        whole=core.whole,
         known=known,
         register=register,
         left_out=lambda: core.replica.overfull,

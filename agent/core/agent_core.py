@@ -175,6 +175,8 @@ class AgentCore(AgentPart):
             event = self._sync.without_repeated(event, now_s)
             if self._is_idle(now_s) and self._attention.only_remembers(event, now_s):
                 return []
+        if self._is_idle(now_s) and self._sync.only_meets(event, now_s):
+            return self._end_step(now_s)
         if not self._machine.has_ended:
             if self._stall_detector.late(now_s):
                 self._sync.held_up(now_s)
@@ -340,8 +342,7 @@ class AgentCore(AgentPart):
 
     def _go_home_if_spent(self, now_s: float) -> None:
         """Bring a UAV that stands by nothing home before its battery is used up."""
-        reason = self._tasking.spent(now_s)
-        if reason is not None and self._machine.acts:
+        if (reason := self._tasking.spent(now_s)) is not None and self._machine.acts:
             self._commander.go_home(reason, now_s)
 
     def _go_on(self, now_s: float) -> None:

@@ -12,10 +12,11 @@ from collections.abc import Collection, Iterable, Sequence
 from statistics import median_high
 
 from agent.core.context import AgentContext, AgentPart
+from agent.core.interface import Event
 from agent.core.mission_view import MissionChange
 from agent.core.tasking import Tasking
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.events import Ask, MessageReceived, MessagesReceived
+from swarm.protocol.events import Ask, MessageReceived, MessagesReceived, PeerSeen
 from swarm.protocol.messages import (
     Body,
     Message,
@@ -27,7 +28,7 @@ from swarm.protocol.messages import (
     TaskEntry,
 )
 from swarm.protocol.registers import without_signers
-from swarm.protocol.sync import QuestionTimer, some_of
+from swarm.protocol.sync import EVERYONE_UP_TO, QuestionTimer, some_of
 from swarm.protocol.timing import Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import ClaimPhase
 
@@ -173,7 +174,7 @@ class StateSync(AgentPart):
     @property
     def _are_many(self) -> bool:
         """Whether there are too many to ask everyone."""
-        return bool(some_of(self._uav, self._peers.membership.present))
+        return len(self._peers.membership.present - {self._uav, COORDINATOR}) >= EVERYONE_UP_TO
 
     def _catch_up(self, now_s: float) -> None:
         """What the others did meanwhile is unknown, and they may be back later than this one."""
@@ -264,6 +265,18 @@ class StateSync(AgentPart):
         if writer != self._uav and self._peers.membership.seen(writer, now_s):
             self._greet(writer, now_s)
 
+    def only_meets(self, event: Event, now_s: float) -> bool:
+        """Note it, if it is somebody who comes before the mission runs and has said nothing yet.
+
+        Nothing else follows from that, however many come.
+        """
+        if not isinstance(event, PeerSeen) or self._mission_view.running:
+            return False
+        if event.writer in self._replica.heads:
+            return False
+        self.see(event.writer, now_s)
+        return True
+
     def miss(self, writer: str, now_s: float) -> None:
         """The token of ``writer`` has disappeared."""
         if writer != self._uav:
@@ -295,11 +308,16 @@ class StateSync(AgentPart):
             self._last_words[writer] = now_s + _LAST_WORDS * self._timing.announce_s
 
     def _greet(self, writer: str, now_s: float) -> None:
-        """Somebody is there anew: tell it the own registers, and hear what it may know."""
+        """Somebody is there anew: tell it the own registers, and hear what it may know.
+
+        Who comes for the first time asks by itself: N who come to N would make all of them repeat
+        what they have said N times.
+        """
         if back := self._peers.back(writer):
             self._log("back", writer=writer)
         if self.queries.ever:
-            self._greet_all(now_s)
+            if back or writer == COORDINATOR or not self._are_many:
+                self._greet_all(now_s)
             if back or writer == COORDINATOR:
                 self.queries.want(now_s, {writer})
 

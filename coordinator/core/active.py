@@ -140,6 +140,10 @@ class CoordinatorCore:
         answers = self.replica.answers(COORDINATOR, self._membership.steady)
         return self._announcer.snapshot(answers, now_s)
 
+    def whole(self, now_s: float) -> Snapshot:
+        """What it tells one who asks some for all they know."""
+        return self._announcer.snapshot(self.replica.messages(), now_s)
+
     def memory(self, now_s: float) -> Snapshot:
         """All it knows, for its next life."""
         memory = self._predecessors.memory(now_s)

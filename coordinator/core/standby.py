@@ -116,6 +116,10 @@ class StandbyCore:
             return self._known(now_s, ())
         return self.coordinator.snapshot(now_s)
 
+    def whole(self, now_s: float) -> Snapshot:
+        """All it knows, once it has taken the seat."""
+        return self.snapshot(now_s) if self.coordinator is None else self.coordinator.whole(now_s)
+
     def memory(self, now_s: float) -> Snapshot:
         """All it knows."""
         if self.coordinator is None:

@@ -20,7 +20,7 @@ statement alone, and so knows no mission, instead of flying it by other times of
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cache
 from typing import Final
@@ -77,6 +77,7 @@ from swarm.protocol.seal import (
     is_envelope,
     open_envelope,
 )
+from swarm.protocol.shared_messages import SharedMessages
 from swarm.protocol.uav_messages import Calibration, Choice, Claim, Nearby, Outcome, Status
 
 IN_SEALED_ANSWER: Final = 64
@@ -109,11 +110,15 @@ def _stamps() -> TypeAdapter[Stamp]:
 class Codec:
     """Reads and writes what one mission's processes say, and counts what it drops.
 
-    With a seal it believes only what is signed, and signs what is written.
+    With a seal it believes only what is signed, and signs what is written. ``shared`` is what other
+    codecs of the same mission in this process have read.
     """
 
-    def __init__(self, mission: str, seal: Seal | None = None) -> None:
+    def __init__(
+        self, mission: str, seal: Seal | None = None, shared: SharedMessages | None = None
+    ) -> None:
         self._mission = mission
+        self._shared = None if seal is not None else shared
         self._keys = KeySpace(mission)
         self._seal = seal
         self.dropped: Counter[str] = Counter()
@@ -266,14 +271,22 @@ class Codec:
         """One register of an answer."""
         if isinstance(register, bytes):
             return self._believed(register)
-        message = self._message(register)
-        message = as_heard(message, repacked(register))
-        _require_size(message)
+        said = repacked(register)
+        message = self._read_once(said, lambda: register)
         return message if self._seal is None else self._roster(message)
 
     def _read(self, said: bytes) -> Message:
-        message = as_heard(self._message(unpacked(said)), said)
+        return self._read_once(said, lambda: unpacked(said))
+
+    def _read_once(self, said: bytes, parts: Callable[[], object]) -> Message:
+        """The message whose bytes are ``said``, with those ``parts``."""
+        shared = self._shared
+        if shared is not None and (known := shared.find(said)) is not None:
+            return known
+        message = as_heard(self._message(parts()), said)
         _require_size(message)
+        if shared is not None:
+            shared.keep(said, message)
         return message
 
     # -- from the own memory --------------------------------------------------------

@@ -54,6 +54,10 @@ class Replica:
 
     def __init__(self) -> None:
         self._registers: dict[str, Message] = {}
+        self._keys_of: dict[str, set[str]] = {}
+        """By writer, of its registers."""
+        self._several_lives: set[str] = set()
+        """Writers of whom statements of more than one life have been heard."""
         self._digest: dict[str, int] = {}
         self._in_digest: dict[str, int] = {}
         """Fingerprint of each register, as far as the digest has been asked for."""
@@ -133,9 +137,12 @@ class Replica:
             self.overfull += 1
             return False
         self._registers[key] = message
+        self._keys_of.setdefault(message.writer, set()).add(key)
         self._changed.add(key)
         self._changes += 1
         head = self.heads.get(message.writer)
+        if head is not None and head.incarnation != message.stamp.incarnation:
+            self._several_lives.add(message.writer)
         if head is None or message.stamp > head:
             self.heads[message.writer] = message.stamp
         self.task_version += isinstance(message.body, Outcome)
@@ -207,6 +214,7 @@ class Replica:
         writers = set[str]()
         for key in strange[MOST_STRANGE:]:
             message = self._registers.pop(key)
+            self._keys_of[message.writer].discard(key)
             self._changes += 1
             writers.add(message.writer)
             self._changed.discard(key)
@@ -216,15 +224,13 @@ class Replica:
                 del self.commands[message.body.target]
             elif isinstance(message.body, UavReady):
                 del self.readies[message.body.uav]
-        kept = {writer: list[Stamp]() for writer in writers}
-        for message in self._registers.values() if writers else ():
-            if message.writer in writers:
-                kept[message.writer].append(message.stamp)
-        for writer, stamps in kept.items():
+        for writer in writers:
+            stamps = [self._registers[key].stamp for key in self._keys_of[writer]]
             if stamps:
                 self.heads[writer] = max(stamps)
             else:
-                del self.heads[writer], self._digest[writer]
+                del self.heads[writer], self._digest[writer], self._keys_of[writer]
+                self._several_lives.discard(writer)
 
     def is_premature(self, message: Message) -> bool:
         """Whether it briefs for another flight, by a coordinator that has not taken charge.
@@ -345,14 +351,17 @@ class Replica:
                 case _:
                     pass
         for writer in {message.writer for _, message in words}:
+            self._several_lives.add(writer)
             self.heads[writer] = max(m.stamp for m in self.messages({writer}))
 
     def messages(self, writers: Iterable[str] | None = None) -> Iterator[Message]:
         """All registers, or those of ``writers``, in key order."""
-        wanted = None if writers is None else set(writers)
-        for _, message in sorted(self._registers.items()):
-            if wanted is None or message.writer in wanted:
-                yield message
+        if writers is None:
+            keys = sorted(self._registers)
+        else:
+            keys = sorted(key for each in set(writers) for key in self._keys_of.get(each, ()))
+        for key in keys:
+            yield self._registers[key]
 
     def answers(self, own: str, steady: Collection[str]) -> tuple[Message, ...]:
         """What ``own`` answers for, in key order.
@@ -364,15 +373,13 @@ class Replica:
         """
         asked = self._changes, own, frozenset(steady)
         if self._asked != asked:
-            heads = self.heads
-            answered = [
-                (key, message)
-                for key, message in self._registers.items()
-                if (writer := message.writer) == own
-                or writer not in steady
-                or message.stamp.incarnation < heads[writer].incarnation
-            ]
-            self._asked, self._answered = asked, tuple(message for _, message in sorted(answered))
+            registers, whole = self._registers, self._keys_of.keys() - (set(steady) - {own})
+            answered = [key for writer in whole for key in self._keys_of[writer]]
+            for writer in self._several_lives - whole:
+                newest = self.heads[writer].incarnation
+                keys = self._keys_of[writer]
+                answered += [k for k in keys if registers[k].stamp.incarnation < newest]
+            self._asked, self._answered = asked, tuple(registers[key] for key in sorted(answered))
         return self._answered
 
     def digest(self) -> dict[str, int]:

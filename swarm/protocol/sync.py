@@ -13,7 +13,7 @@ from bisect import bisect
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass
 from functools import reduce
-from itertools import islice
+from itertools import chain, islice
 from operator import xor
 from typing import Any, Final
 
@@ -94,6 +94,19 @@ def fingerprint(message: Message) -> int:
 def combined(numbers: Iterable[int]) -> int:
     """Digests of several writers, or of any statements, as one; in any order."""
     return reduce(xor, numbers, 0) % MAX_COUNT
+
+
+def digest_of(told: Iterable[Iterable[Message]]) -> dict[str, int]:
+    """The digest of who knows these statements alone, of each register the newest."""
+    newest: dict[str, Message] = {}
+    for message in chain.from_iterable(told):
+        known = newest.setdefault(message.key, message)
+        if message.stamp > known.stamp:
+            newest[message.key] = message
+    digest: dict[str, int] = {}
+    for message in newest.values():
+        digest[message.writer] = digest.get(message.writer, 0) ^ fingerprint(message)
+    return digest
 
 
 def unknown(

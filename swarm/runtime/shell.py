@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import asyncio
 from collections import Counter, deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Generic, Protocol, TypeVar
 
@@ -49,6 +49,7 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.registers import NO_ROOM
 from swarm.protocol.seal import Seal
+from swarm.protocol.shared_messages import SharedMessages
 from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind
 from swarm.protocol.uav_messages import News
 from swarm.runtime.clock import Clock
@@ -108,6 +109,8 @@ class Shell(Generic[E, A]):
             board: it looks now and then, and before it decides anything by itself. None for a
             core that wants to hear each when it comes.
         settled: whether nothing would follow at once from what others claim.
+        crowd: see `StateExchange`.
+        shared: what others in this process have heard; None for one that is alone there.
     """
 
     def __init__(
@@ -131,6 +134,8 @@ class Shell(Generic[E, A]):
         draw_nonce: Callable[[], bytes] = draw_nonce,
         together: Callable[[MessagesReceived], E] | None = None,
         settled: Callable[[], bool] = lambda: True,
+        crowd: Callable[[Collection[str]], Sequence[str]] | None = None,
+        shared: SharedMessages | None = None,
     ) -> None:
         self._core = core
         self._bus = bus
@@ -138,7 +143,7 @@ class Shell(Generic[E, A]):
         self._mission = mission
         self._keys = KeySpace(mission)
         self._seal = bus.seal
-        self._codec = Codec(mission, bus.seal)
+        self._codec = Codec(mission, bus.seal, shared)
         self._admission = AdmissionControl(self._keys, bus.seal, clock.now_s)
         bus.inbox.admits = self._admission.admits
         self._log = get_logger(name, mission=mission)
@@ -153,6 +158,7 @@ class Shell(Generic[E, A]):
             known=known,
             answer_s=answer_s,
             draw_nonce=draw_nonce,
+            crowd=crowd,
         )
         self._from_bus = from_bus
         self._execute = execute
@@ -414,9 +420,12 @@ class Shell(Generic[E, A]):
                 return MessageReceived(message)
             case TokenSeen(key):
                 writer = self._keys.writer_of_token(key)
+                if writer is not None:
+                    self._questions.there.add(writer)
                 return None if writer is None else PeerSeen(writer)
             case TokenGone(key):
                 writer = self._keys.writer_of_token(key)
+                self._questions.there.discard(writer or "")
                 return None if writer is None else PeerGone(writer)
             case LinkUp():
                 return LinkChanged(True)

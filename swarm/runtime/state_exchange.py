@@ -8,17 +8,25 @@ from __future__ import annotations
 
 import asyncio
 import secrets
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
 from swarm.bus.admission import QuestionFilter
 from swarm.bus.port import Answer, Bus
+from swarm.model.ids import COORDINATOR
 from swarm.protocol.codec import Codec
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.seal import UnacceptableError
-from swarm.protocol.sync import NONCE_BYTES, bond, decode_question, encode_question, unknown
+from swarm.protocol.sync import (
+    NONCE_BYTES,
+    bond,
+    decode_question,
+    digest_of,
+    encode_question,
+    unknown,
+)
 from swarm.runtime.clock import Clock
 from swarm.runtime.log import get_logger
 
@@ -39,7 +47,9 @@ def draw_nonce() -> bytes:
 class StateExchange:
     """Asks and answers for one process; arguments are those of `swarm.runtime.shell.Shell`.
 
-    ``codec`` counts what is worth nothing.
+    ``codec`` counts what is worth nothing. ``crowd`` tells, of those who are there, whom a question
+    to everyone is for; nobody: for everyone. With it the first such question goes to the
+    coordinator and the own name before, since it is known with their answer who is there.
     """
 
     def __init__(
@@ -55,6 +65,7 @@ class StateExchange:
         known: Callable[[], Mapping[str, int]],
         answer_s: float,
         draw_nonce: Callable[[], bytes] = draw_nonce,
+        crowd: Callable[[Collection[str]], Sequence[str]] | None = None,
     ) -> None:
         self._bus = bus
         self._seal = bus.seal
@@ -67,6 +78,10 @@ class StateExchange:
         self._known = known
         self._answer_s = answer_s
         self._draw_nonce = draw_nonce
+        self._crowd = crowd
+        self._knows_crowd = False
+        self.there: set[str] = set()
+        """Who shows a token."""
         self._asked = QuestionFilter(clock.now_s)
         self._log = get_logger(name, mission=mission)
         self._loop = asyncio.get_running_loop()
@@ -99,9 +114,28 @@ class StateExchange:
 
         ``heed`` is told each answer's rosters first: by the newest of them all else is believed.
         """
+        learned: tuple[Snapshot, ...] = ()
+        if not of and self._crowd is not None:
+            if not self._knows_crowd:
+                self._knows_crowd = True
+                learned = await self._ask(heed, (self._name, COORDINATOR), ())
+            of = self._crowd(self.there)
+        asked_s = self._clock.now_s()
+        answers = await self._ask(heed, of, learned)
+        age_s = self._clock.now_s() - asked_s
+        return *(_aged(told, age_s) for told in learned), *answers
+
+    async def _ask(
+        self,
+        heed: Callable[[Iterable[Message]], None],
+        of: Sequence[str],
+        learned: Sequence[Snapshot],
+    ) -> tuple[Snapshot, ...]:
+        """Whatever else than what has been ``learned`` those, or all, tell."""
         asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
         # What is said in the own name is always told: by who remembers an earlier life, or a twin.
-        known = {writer: number for writer, number in self._known().items() if writer != self._name}
+        known = {**self._known(), **digest_of(each.messages for each in learned)}
+        known.pop(self._name, None)
         nonce = self._draw_nonce()
         question = encode_question(known, nonce, self._seal, whole=bool(of))
         expected = bond(None if self._seal is None else self._seal.name, nonce)

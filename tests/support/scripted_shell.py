@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Collection, Mapping, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass
 
@@ -92,6 +92,7 @@ async def at_work(
     save: Callable[[float], None] | None = None,
     capacity: int = 4096,
     together: Callable[[MessagesReceived], CommonEvent] | None = None,
+    crowd: Callable[[Collection[str]], Sequence[str]] | None = None,
 ) -> AsyncIterator[Played]:
     """A shell that runs ``core`` on the seat of u0, seen from the seat of u1."""
     network = MemoryNetwork()
@@ -119,6 +120,7 @@ async def at_work(
         left_out=left_out,
         save=save,
         together=together,
+        crowd=crowd,
     )
     running = asyncio.create_task(shell.run())
     try:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from agent.core.interface import Action
+from agent.core.interface import Action, VehicleReady
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import (
     Ask,
@@ -129,6 +129,31 @@ def test_many_who_come_together_are_greeted_together() -> None:
     assert notes(agent.log[before:]).count("back") == 59
     assert 1 <= len(claims(agent.log[before:])) <= 3
     assert 1 <= len(asked(agent.log[before:])) <= 5
+
+
+@pytest.mark.parametrize(("n_uav", "greets"), [(10, True), (100, False)])
+def test_who_comes_to_many_for_the_first_time_is_not_greeted_for_it_asks(
+    n_uav: int, greets: bool
+) -> None:
+    agent = fleet(n_uav)
+    keep_alive(agent, 5.0)
+    agent.run_until(agent.now_s - 200.0 + 2.0 * stretch_of(n_uav) * TIMING.ask_gap_s)
+
+    actions = agent.happen(PeerSeen("newcomer"))
+
+    assert bool(claims(actions)) is greets
+    assert asked(actions) == []
+
+
+def test_who_comes_before_the_mission_runs_is_there_and_waited_for_as_ever() -> None:
+    agent = LoneAgent(uav("u0"), uav("u1"), timing=TIMING)
+    agent.learn(agent.statement(COORDINATOR, agent.brief))
+    agent.happen(VehicleReady())
+
+    agent.happen(PeerSeen("u1"))
+    agent.happen(PeerGone("u1"))
+
+    assert lost(agent.run_until(agent.now_s - 200.0 + 2.0 * TIMING.loss_delay_s)) == ["u1"]
 
 
 def test_a_uav_of_a_large_fleet_may_be_silent_longer_and_the_coordinator_may_not() -> None:

@@ -533,6 +533,8 @@ def test_it_answers_with_its_own_registers_and_those_of_the_absent() -> None:
     assert answered_for() == {COORDINATOR, "u1"}
     coordinator.hear("u1", IDLE)
     assert answered_for() == {COORDINATOR}
+    whole = coordinator.core.whole(coordinator.now_s)
+    assert {m.writer for m in whole.messages} == {COORDINATOR, "u0", "u1"}
 
 
 def test_its_answer_tells_the_mission_time() -> None:

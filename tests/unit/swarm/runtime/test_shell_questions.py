@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Collection
 from dataclasses import replace
 
 import pytest
@@ -13,8 +14,8 @@ from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.events import Ask, Save, SnapshotsReceived
 from swarm.protocol.messages import MissionPhase, PlanEpoch, Snapshot
-from swarm.protocol.sync import decode_digest, encode_digest
-from tests.support.builders import MISSION, message
+from swarm.protocol.sync import decode_digest, encode_digest, fingerprint
+from tests.support.builders import MISSION, epoch, message
 from tests.support.memory_bus import MemoryBus
 from tests.support.scripted_shell import CLAIM, KEYS, SNAPSHOT, ScriptedCore, at_work
 from tests.support.shell_play import play, until
@@ -166,6 +167,63 @@ def test_a_question_tells_what_the_core_knows_but_for_the_own_registers() -> Non
 
             await until(asked, "being asked")
             assert decode_digest(queries[0].payload) == {"u1": 2, COORDINATOR: 3}
+
+    play(scenario)
+
+
+@pytest.mark.parametrize("asked", [(), ("u1",)], ids=["everyone", "some"])
+def test_who_asks_first_asks_the_coordinator_and_then_whom_the_crowd_is_asked_by(
+    asked: tuple[str, ...],
+) -> None:
+    """Who is there is known with its answer; what it told is not told again."""
+    heard = message(COORDINATOR, epoch("u0"))
+    seen: list[set[str]] = []
+
+    def crowd(there: Collection[str]) -> tuple[str, ...]:
+        seen.append(set(there))
+        return asked
+
+    async def scenario() -> None:
+        core = ScriptedCore(first=[Ask()])
+        async with at_work(core, crowd=crowd) as played:
+            coordinator, second = played.network.join(COORDINATOR), played.network.join("u2")
+            coordinator.serve(KEYS.state(COORDINATOR))
+            second.serve(KEYS.state("u2"))
+            questions: list[tuple[str, Query]] = []
+            began_s = played.clock.time_s
+
+            def take() -> None:
+                for bus in (coordinator, played.other, second):
+                    taken = [event for event in bus.inbox.take() if isinstance(event, Query)]
+                    questions.extend((event.key, event) for event in taken)
+
+            def learned() -> bool:
+                take()
+                for key, query in questions:
+                    first = key == KEYS.state(COORDINATOR) and query is questions[0][1]
+                    told, mission_s = ((heard,), 100.0) if first else ((), None)
+                    writer = key.rpartition("/")[2]
+                    query.reply(encode(Snapshot(MISSION, writer, 1, mission_s, told)))
+                if len(questions) > 1:
+                    played.clock.time_s = 4.0 + began_s
+                return any(isinstance(fact, SnapshotsReceived) for fact in core.heard)
+
+            await until(learned, "learning")
+            coordinator.close()
+            second.close()
+
+            first, *then = questions
+            assert first[0] == KEYS.state(COORDINATOR)
+            others = {KEYS.state("u1")} if asked else {KEYS.state(w) for w in ("u1", "u2")}
+            assert {key for key, _ in then} - {KEYS.state(COORDINATOR)} == others
+            for _, query in then:
+                digest = decode_digest(query.payload)
+                assert digest is not None
+                assert digest[COORDINATOR] == fingerprint(heard)
+            assert seen == [{"u1"}]
+            learned_from = [f for f in core.heard if isinstance(f, SnapshotsReceived)]
+            told_first = next(each for each in learned_from[0].snapshots if each.messages)
+            assert (told_first.messages, told_first.mission_s) == ((heard,), 104.0)
 
     play(scenario)
 
