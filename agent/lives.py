@@ -15,7 +15,9 @@ from agent.core.agent_core import AgentCore
 from agent.runner import MakeVehicle, OnReport, Vehicle, live_once
 from swarm.bus.config import BusConfig, ClientTopology
 from swarm.bus.port import Bus
+from swarm.bus.shared_seats import SharedBus, SharedSeats
 from swarm.protocol.messages import MissionConfig
+from swarm.protocol.shared_messages import SharedMessages
 from swarm.runtime import garbage
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError
@@ -72,7 +74,7 @@ def members_of(
 
 def live(
     lives: Sequence[Life],
-    open_bus: Callable[[], Awaitable[Bus]],
+    open_bus: Callable[[], Awaitable[SharedBus]],
     clock: Clock,
     *,
     mission: str,
@@ -83,20 +85,26 @@ def live(
 
     Args:
         lives: one or more.
-        open_bus: tries once to get a seat for one of them.
+        open_bus: tries once to get a seat; several share one.
         clock: gives the cores' time.
         mission: mission name.
         answer_s: how long a question waits for the slowest answer [wall s].
         lifeline: whether the end of standard input ends the process.
     """
 
-    async def live_one(each: Life, stop: StopRequest, joined: asyncio.Event) -> int:
+    async def live_one(
+        each: Life,
+        stop: StopRequest,
+        joined: asyncio.Event,
+        open_seat: Callable[[], Awaitable[Bus]],
+        shared: SharedMessages | None,
+    ) -> int:
         def make_vehicle(brief: MissionConfig, report: OnReport) -> Vehicle:
             joined.set()
             return each.make_vehicle(brief, report)
 
         return await live_once(
-            open_bus,
+            open_seat,
             each.make_core,
             make_vehicle,
             clock,
@@ -106,13 +114,17 @@ def live(
             store=each.store,
             answer_s=answer_s,
             on_wait=lambda reason: _tell_no_bus(each.uav, reason),
+            shared=shared,
         )
 
     async def live_all() -> int:
         async with stop_requests(lifeline=lifeline) as stop:
             if len(lives) == 1:
-                return await live_one(lives[0], stop, asyncio.Event())
-            return await live_together(lives, lambda each, joined: live_one(each, stop, joined))
+                return await live_one(lives[0], stop, asyncio.Event(), open_bus, None)
+            seats, shared = SharedSeats(open_bus), SharedMessages()
+            return await live_together(
+                lives, lambda each, joined: live_one(each, stop, joined, seats.seat, shared)
+            )
 
     try:
         return asyncio.run(live_all())

@@ -183,7 +183,11 @@ class ZenohBus:
         self._gathered = GatheredSubscriptions(session, self._call)
         self._watched: set[str] = set()
         self._served: set[str] = set()
+        self._queryables: dict[str, zenoh.Queryable[None]] = {}
+        """By key; the writer's thread alone looks at them."""
+        self._held: set[str] = set()
         self._tokens: dict[str, zenoh.LivelinessToken | None] = {}
+        """By key, those held now or just now; changed on the writer's thread."""
         # A thread that comes back from Zenoh while the interpreter ends aborts the process.
         atexit.register(self.close)
         self._replies: weakref.WeakSet[_Reply] = weakref.WeakSet()
@@ -268,9 +272,17 @@ class ZenohBus:
         """Hold a liveliness token on ``key``."""
         self._check_open()
         check_key(key)
-        if key not in self._tokens:
-            self._tokens[key] = None
+        if key not in self._held:
+            self._held.add(key)
+            self._tokens.setdefault(key)  # before its word comes back
             self._call(partial(self._declare_token, key))
+
+    def release_token(self, key: str) -> None:
+        """Hold the token on ``key`` no longer; see `swarm.bus.shared_seats.SharedBus`."""
+        self._check_open()
+        if key in self._held:
+            self._held.discard(key)
+            self._call(partial(self._undeclare_token, key))
 
     def watch_tokens(self, key_expr: str) -> None:
         """Receive `TokenSeen` and `TokenGone`."""
@@ -288,10 +300,14 @@ class ZenohBus:
         check_key(key)
         if key not in self._served:
             self._served.add(key)
-            on_query = _direct(partial(self._on_query, key))
-            declare = self._session.declare_queryable
-            remote = zenoh.Locality.REMOTE
-            self._call(lambda: declare(key, on_query, allowed_origin=remote))
+            self._call(partial(self._declare_queryable, key))
+
+    def stop_serving(self, key: str) -> None:
+        """Receive no further `Query` on ``key``."""
+        self._check_open()
+        if key in self._served:
+            self._served.discard(key)
+            self._call(lambda: self._queryables.pop(key).undeclare())
 
     async def query(
         self, key_expr: str, payload: bytes = b"", *, timeout_s: float
@@ -371,6 +387,27 @@ class ZenohBus:
     def _declare_token(self, key: str) -> None:
         # Kept, or it would be undeclared when it is collected.
         self._tokens[key] = self._session.liveliness().declare_token(key)
+
+    def _undeclare_token(self, key: str) -> None:
+        token = self._tokens[key]
+        if token is not None:
+            token.undeclare()
+        del self._tokens[key]
+        # Of who else holds it nothing was told as long as this process did.
+        others: list[zenoh.Reply] = []
+
+        def tell() -> None:
+            event = TokenSeen(key) if others else TokenGone(key)
+            self._inbox.offer_threadsafe(event)
+
+        found = Callback(others.append, tell, indirect=False)
+        self._session.liveliness().get(key, found, timeout=REPLY_WITHIN_S)
+
+    def _declare_queryable(self, key: str) -> None:
+        on_query = _direct(partial(self._on_query, key))
+        remote = zenoh.Locality.REMOTE
+        queryable = self._session.declare_queryable(key, on_query, allowed_origin=remote)
+        self._queryables[key] = queryable
 
     # Zenoh's threads call what follows.
 

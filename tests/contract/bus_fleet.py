@@ -13,6 +13,7 @@ import numpy as np
 from swarm.bus.config import BusConfig, ClientTopology, MeshTopology
 from swarm.bus.loopback import free_loopback_endpoints
 from swarm.bus.port import Bus, BusEvent, LinkUp, Sample, TokenSeen
+from swarm.bus.shared_seats import SharedSeats
 from swarm.bus.zenoh_bus import open_zenoh_bus
 from tests.support.memory_bus import MemoryNetwork
 
@@ -85,6 +86,26 @@ async def _zenoh_seats(configs: Iterator[BusConfig]) -> AsyncIterator[Join]:
             return bus
 
         yield join
+
+
+def shared_seats(*routers: str) -> Seats:
+    """Seats of one process that share a client's; every second one has another process's."""
+
+    @contextlib.asynccontextmanager
+    async def seats() -> AsyncIterator[Join]:
+        config = BusConfig(ClientTopology(routers))
+        processes = [SharedSeats(lambda: open_zenoh_bus(config, timeout_s=LIMIT_S)) for _ in "ab"]
+        turns = itertools.cycle((0, 0, 1))
+        with contextlib.ExitStack() as open_seats:
+
+            async def join(*, inbox_capacity: int = 4096) -> Bus:
+                seat = await processes[next(turns)].seat(inbox_capacity=inbox_capacity)
+                open_seats.callback(seat.close)
+                return seat
+
+            yield join
+
+    return seats
 
 
 class Reader:

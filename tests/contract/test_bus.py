@@ -23,6 +23,7 @@ from tests.contract.bus_fleet import (
     mesh_seats,
     run,
     settle,
+    shared_seats,
 )
 
 SWARM = "import sys; from swarm.cli import console_main; sys.exit(console_main())"
@@ -44,13 +45,14 @@ def router_endpoint() -> Iterator[str]:
         process.terminate()
 
 
-@pytest.fixture(params=["memory", "mesh", "clients"])
+@pytest.fixture(params=["memory", "mesh", "clients", "shared"])
 def seats(request: pytest.FixtureRequest) -> Seats:
     if request.param == "memory":
         return memory_seats()
     if request.param == "mesh":
         return mesh_seats()
-    return client_seats(request.getfixturevalue("router_endpoint"))
+    made = client_seats if request.param == "clients" else shared_seats
+    return made(request.getfixturevalue("router_endpoint"))
 
 
 def test_samples_reach_all_others_and_not_the_publisher(seats: Seats) -> None:
