@@ -86,8 +86,7 @@ class AgentCore(AgentPart):
             that do not fly quite where they are told.
         verticals: what landing and climbing cost, and where it lands, as far as it is known
             beforehand; None for vehicles that take no time for it.
-        without_bus_s: go home when the own link to the bus has been down for that long; None
-            to fly on.
+        without_bus_s: go home when the own link has been down for that long; None: fly on.
         make_rule: what it decides by, given an epoch's rule and routes; alike for the fleet.
         make_field_rule: the same where the field's constraints count.
         shows_stations: whether there are ground stations to be shown what it does.
