@@ -437,7 +437,7 @@ class MissionEndCondition:
         silent = self._without_a_claim(fleet)
         may_return = self._can_go_on(taking_part, mission_s) or anything_doable(self._board, silent)
         may_return |= more_to_come and bool(taking_part | silent)
-        return NOBODY_LEFT, self._timing.abandon_s if may_return else 0.0
+        return NOBODY_LEFT, self._timing.abandon_s if may_return else self._may_claim_s(here)
 
     def _without_a_claim(self, fleet: Iterable[UavId]) -> set[UavId]:
         """Who gets ready, or was lost while it did, and may yet take part.
@@ -448,3 +448,14 @@ class MissionEndCondition:
         given_up = dispensable(self._board.replica)
         silent = {uav for uav in fleet if uav not in claims and uav not in given_up}
         return {uav for uav in silent if uav in members.present or members.missed(uav)}
+
+    def _may_claim_s(self, here: Collection[str]) -> float:
+        """How long the word of a claim may take that is not expected from what is known [s].
+
+        In the field what a UAV can do depends on where it is, and who is in the air without a task
+        may be anywhere on a way that it has left.
+        """
+        claims = self._board.replica.claims
+        unknown = any(claims[uav].base is None for uav in here)
+        in_field = self._board.field_problem is not None
+        return 2.0 * self._timing.patience_s if in_field and unknown else 0.0

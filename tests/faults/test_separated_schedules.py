@@ -28,6 +28,7 @@ BROKEN_ONCE = {
     3100594: "who left a task for another layer still went by its own, and fell on the way",
     3100739: "who was held before it took off had let others have the air above its start",
     3010690: "an operator left whom only those had confirmed whose tokens had come up by then",
+    3101968: "the mission was ended though one that was held near a task had just claimed it",
     3102180: "the judge took somebody in another layer to fly to a task's height on a slant",
     3102337: "who began anew had not been told the time, and left its task for that",
     3102434: "who stopped where it hovered, and asked for its way home at once, took it as flown",

@@ -313,6 +313,21 @@ def test_a_mission_ends_when_nobody_can_do_what_is_left_in_time() -> None:
     assert finishes(coordinator.run_until(500.0)) == [0], "it was due, and may be left out"
 
 
+def test_who_hovers_nobody_knows_where_has_the_time_to_claim_what_it_can_do() -> None:
+    """It may be near the task, as one that the operator has held on its way."""
+    flown = mission([U0], [task("t0", 5.0), replace(task("t1", 900.0), closes_s=50.0)])
+    coordinator = LoneCoordinator(flown).started()
+    coordinator.hear("u0", held("t0", 0.0), 101.0)
+    coordinator.hear("u0", done("t0"), 105.0)
+    coordinator.hear("u0", IDLE, 105.0)
+    coordinator.run_until(105.5)
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    coordinator.hear("u0", held("t1", 5.0, completion_s=20.0), 105.6)
+    coordinator.run_until(140.0)
+    assert coordinator.phase is MissionPhase.RUNNING
+
+
 def test_a_mission_goes_on_as_long_as_a_uav_can_swap_for_what_is_left() -> None:
     battery = replace(U0, endurance_s=100.0, reserve_frac=0.0)
     base = Base(BaseId("b0"), (0.0, 0.0, 0.0), swap_s=30.0)
