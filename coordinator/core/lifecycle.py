@@ -422,22 +422,32 @@ class MissionEndCondition:
         fleet = () if problem is None else problem.uav_ids
         taking_part = {u for u in fleet if u in claims and claims[u].phase is not ClaimPhase.OUT}
         here = taking_part & self._membership.present
+        silent = self._without_a_claim(fleet)
         if self._can_go_on(here, mission_s) or (more_to_come and here):
             paused = {uav for uav in here if claims[uav].phase is ClaimPhase.PAUSED}
             if self._can_go_on(paused, mission_s) or (more_to_come and paused):
                 return None, 0.0  # the operator has stopped whom it may take: it is for them to say
-            idle = all(claims[uav].phase is ClaimPhase.IDLE for uav in here - paused)
+            if more_to_come or any(claims[u].phase is not ClaimPhase.IDLE for u in here - paused):
+                return None, 0.0
             # Every UAV may refuse a task for reasons of its own, such as a geofence.
-            return (NOBODY_WILL if idle and not more_to_come else None), self._timing.stalemate_s
+            away_s = self._waits_s(taking_part - here, silent, mission_s, more_to_come=False)
+            return NOBODY_WILL, max(away_s, self._timing.stalemate_s)
         if self.somebody_knows_more:
             return None, 0.0
         if TaskState.OPEN not in self._board.states.values() and not more_to_come:
             return ALL_ENDED, 0.0
-        # Who was lost and never said that it is out may have been cut off, and come back.
-        silent = self._without_a_claim(fleet)
-        may_return = self._can_go_on(taking_part, mission_s) or anything_doable(self._board, silent)
-        may_return |= more_to_come and bool(taking_part | silent)
-        return NOBODY_LEFT, self._timing.abandon_s if may_return else self._may_claim_s(here)
+        away_s = self._waits_s(taking_part, silent, mission_s, more_to_come=more_to_come)
+        return NOBODY_LEFT, away_s or self._may_claim_s(here)
+
+    def _waits_s(
+        self, lost: set[UavId], silent: set[UavId], mission_s: float, *, more_to_come: bool
+    ) -> float:
+        """How long to wait for who is not there to come back, or to get ready [s].
+
+        Who was lost and never said that it is out may only have been cut off.
+        """
+        able = self._can_go_on(lost, mission_s) or anything_doable(self._board, silent)
+        return self._timing.abandon_s if able or (more_to_come and lost | silent) else 0.0
 
     def _without_a_claim(self, fleet: Iterable[UavId]) -> set[UavId]:
         """Who gets ready, or was lost while it did, and may yet take part.

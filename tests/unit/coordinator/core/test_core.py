@@ -389,6 +389,18 @@ def test_a_task_that_every_uav_refuses_ends_the_mission_in_the_end() -> None:
     assert coordinator.reason == "nobody takes what is left"
 
 
+def test_what_nobody_takes_is_left_to_one_that_is_lost_for_as_long_as_to_come_back() -> None:
+    coordinator = LoneCoordinator(mission([U0, U1], [T0])).started()
+    coordinator.hear("u1", held("t0", 0.0))
+    coordinator.lose("u1", 110.0)
+    ends_s = coordinator.now_s + TIMING.abandon_s
+    coordinator.run_until(ends_s - 1.0)
+    assert coordinator.phase is MissionPhase.RUNNING
+
+    coordinator.run_until(ends_s + 1.0)
+    assert coordinator.reason == "nobody takes what is left"
+
+
 def test_as_long_as_one_is_at_work_there_is_no_stalemate() -> None:
     coordinator = LoneCoordinator(mission([U0, U1], [T0])).started()
     coordinator.run_until(110.0)
