@@ -150,7 +150,9 @@ class MavlinkVehicle:
 
     def _tell_of_dropped(self) -> None:
         """Tell people of every reason once: a hostile peer must not fill the log."""
-        for reason, count in self._disbelieved().items():
+        codec = self.bridge.codec
+        believes_all = not (codec.distrusted or codec.strangers)
+        for reason, count in () if believes_all else self._disbelieved().items():
             if reason not in self._told_dropped:
                 self._told_dropped.add(reason)
                 self._log.warning("frames are dropped", reason=reason, count=count)

@@ -28,7 +28,7 @@ from swarm.model import Mission, Plan
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import CommonAction, CommonEvent
 from swarm.protocol.messages import MissionPhase
-from swarm.protocol.timing import preset
+from swarm.protocol.timing import UNSTRETCHED_UAVS, preset
 from swarm.runtime.clock import ScaledClock
 from swarm.runtime.shell import Core, Shell, join_mission
 
@@ -38,6 +38,9 @@ PATIENCE = 4.0
 """A mission may take this many times its planned time..."""
 PATIENCE_S = 60.0
 """...and this much longer, before it is given up [s of mission or wall, whichever is slower]."""
+LINGER_S = 0.02
+"""Wall time for which what UAVs of a large fleet say is collected: hundreds a second otherwise wake
+this process one by one."""
 MAX_DEATHS = 10
 """A router, or a dashboard, that dies more often than this is not started again."""
 CONDITION_S = 0.02
@@ -322,6 +325,8 @@ async def _watching(run: Run) -> AsyncIterator[None]:
     """Keep the mission state up to date from the bus."""
     mission = run.launch.mission.name
     bus = await open_zenoh_bus(run.launch.layout.observer_seat())
+    if len(run.launch.mission.uavs) > UNSTRETCHED_UAVS:
+        bus.inbox.linger_s = LINGER_S
     recorder = run.recorder
     shell: Shell[CommonEvent, CommonAction] = Shell(
         run.mission_state

@@ -117,6 +117,9 @@ class Inbox:
         self._ready = asyncio.Event()
         self.dropped = 0
         """Events dropped because the reader was too slow."""
+        self.linger_s = 0.0
+        """Wall time from the first event on for which more are waited for, so that who hears very
+        many is not woken for each."""
         self.admits: Callable[[BusEvent], bool] | None = None
         """What is not to be taken in at all; asked by whichever thread brings an event, one at
         a time. None to take everything."""
@@ -162,11 +165,13 @@ class Inbox:
         return events
 
     async def wait(self) -> None:
-        """Return as soon as `take` has something to give.
+        """Return as soon as `take` has something to give, or `linger_s` later.
 
         It may have less than expected: whoever took in between has the rest.
         """
         await self._ready.wait()
+        if self.linger_s > 0.0:
+            await asyncio.sleep(self.linger_s)
 
     def _put(self, event: BusEvent, latest: bool) -> bool:
         """Append under the lock, making room if there is none; False if it is not let in."""

@@ -12,7 +12,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import Counter, deque
-from collections.abc import Awaitable, Callable, Collection, Iterator, Sequence
+from collections.abc import Awaitable, Callable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Final, Protocol
@@ -39,8 +39,8 @@ from swarm.runtime.log import get_logger
 
 MOST_WAITING: Final = 8192
 """Samples of one seat that wait to be gathered."""
-_MOST_ROUTES: Final = 4096
-"""Keys of which is kept who wants what is said on them."""
+_MOST_KEYS: Final = 4096
+"""Keys of which is kept by what they are subscribed to."""
 
 
 class SharedBus(Bus, Protocol):
@@ -80,8 +80,8 @@ class SharedSeats:
         """By key expression, what the bus has been asked for."""
         self._tokens: dict[str, set[str]] = {}
         """By key expression that is watched, tokens of others on the bus."""
-        self._routes: dict[str, list[tuple[SharedSeat, _Subscription]]] = {}
-        """By key, who wants what is said on it."""
+        self._matching: dict[str, list[str]] = {}
+        """By key, the expressions subscribed to that match it."""
         self._dropped = 0
 
     async def seat(self, *, inbox_capacity: int = 4096) -> SharedSeat:
@@ -133,7 +133,7 @@ class SharedSeats:
         if self._reading is not None:
             self._reading.cancel()
         self._linked = False
-        for known in (self._subscribed, self._tokens, self._routes):
+        for known in (self._subscribed, self._tokens, self._matching):
             known.clear()
         if bus is not None:
             bus.close()
@@ -148,8 +148,9 @@ class SharedSeats:
 
     def subscribed(self, key_expr: str) -> None:
         """What seats want to hear of it has changed."""
-        self._routes.clear()
         wanted = [s.subscriptions[key_expr] for s in self._seats if key_expr in s.subscriptions]
+        if key_expr not in self._subscribed or not wanted:
+            self._matching.clear()
         if not wanted:
             if self._subscribed.pop(key_expr, None) is not None:
                 self.bus.unsubscribe(key_expr)
@@ -177,8 +178,9 @@ class SharedSeats:
 
     def _tell_token(self, event: TokenSeen | TokenGone) -> None:
         """Tell whoever watches it and does not hold it."""
+        matching = [key_expr for key_expr in self._tokens if _matches(key_expr, event.key)]
         for seat in self._seats:
-            if event.key not in seat.tokens and _any_matches(seat.watched, event.key):
+            if event.key not in seat.tokens and not seat.watched.isdisjoint(matching):
                 seat.inbox.offer(event)
 
     def watch_tokens(self, seat: SharedSeat, key_expr: str) -> None:
@@ -189,7 +191,7 @@ class SharedSeats:
             self.bus.watch_tokens(key_expr)  # which tells of those that there are
         beside = {key for other in self._seats for key in other.tokens}
         for key in sorted((there | beside) - seat.tokens):
-            if _any_matches((key_expr,), key):
+            if _matches(key_expr, key):
                 seat.inbox.offer(TokenSeen(key))
 
     def serving(self, asker: SharedSeat, key_expr: str) -> Iterator[tuple[SharedSeat, str]]:
@@ -197,7 +199,7 @@ class SharedSeats:
         for seat in self._seats:
             if seat is not asker:
                 for key in sorted(seat.served):
-                    if _any_matches((key_expr,), key):
+                    if _matches(key_expr, key):
                         yield seat, key
 
     # -- what comes from the bus ----------------------------------------------------------
@@ -220,7 +222,7 @@ class SharedSeats:
                 self._hand_round(event)
             case TokenSeen(key) | TokenGone(key):
                 for key_expr, there in self._tokens.items():
-                    if _any_matches((key_expr,), key):
+                    if _matches(key_expr, key):
                         (there.add if isinstance(event, TokenSeen) else there.discard)(key)
                 self._tell_token(event)
             case Query(key):
@@ -233,23 +235,21 @@ class SharedSeats:
                     seat.inbox.offer(event)
 
     def _hand_round(self, sample: Sample, but: SharedSeat | None = None) -> None:
-        routes = self._routes.get(sample.key)
-        if routes is None:
-            if len(self._routes) >= _MOST_ROUTES:
-                self._routes.clear()
-            routes = self._routes[sample.key] = [
-                (seat, how)
-                for seat in self._seats
-                for key_expr, how in seat.subscriptions.items()
-                if _any_matches((key_expr,), sample.key)
-            ]
-        for seat, how in routes:
-            if seat is but:
-                continue
-            if how.gathered:
-                seat.waiting.append((sample, how.latest))
-            else:
-                seat.inbox.offer(sample, how.latest)
+        matching = self._matching.get(sample.key)
+        if matching is None:
+            if len(self._matching) >= _MOST_KEYS:
+                self._matching.clear()
+            matching = [each for each in self._subscribed if _matches(each, sample.key)]
+            self._matching[sample.key] = matching
+        for key_expr in matching:
+            for seat in self._seats:
+                how = seat.subscriptions.get(key_expr)
+                if how is None or seat is but:
+                    continue
+                if how.gathered:
+                    seat.waiting.append((sample, how.latest))
+                else:
+                    seat.inbox.offer(sample, how.latest)
 
 
 class SharedSeat:
@@ -261,7 +261,6 @@ class SharedSeat:
         self._seats = seats
         self._loop = asyncio.get_running_loop()
         self._inbox = Inbox(self._loop, inbox_capacity)
-        self._questions: list[_NearQuestion] = []
         self._closed = False
         self.subscriptions: dict[str, _Subscription] = {}
         self.tokens: set[str] = set()
@@ -423,5 +422,5 @@ class _AnswerOnce:
                 self.loop.call_soon_threadsafe(self.arrive, payload)
 
 
-def _any_matches(key_exprs: Collection[str], key: str) -> bool:
-    return any(zenoh.KeyExpr(key_expr).includes(key) for key_expr in key_exprs)
+def _matches(key_expr: str, key: str) -> bool:
+    return zenoh.KeyExpr(key_expr).includes(key)

@@ -7,7 +7,7 @@ import threading
 
 import pytest
 
-from swarm.bus.port import Inbox, LinkDown, Query, Sample, TokenGone
+from swarm.bus.port import BusEvent, Inbox, LinkDown, Query, Sample, TokenGone
 
 
 def sample(n: int, key: str = "k") -> Sample:
@@ -128,3 +128,20 @@ def test_capacity_below_one_is_refused() -> None:
             Inbox(asyncio.get_running_loop(), capacity=0)
 
     asyncio.run(scenario())
+
+
+def test_who_hears_very_many_is_woken_once_for_those_that_come_together() -> None:
+    async def scenario() -> list[BusEvent]:
+        inbox = Inbox(asyncio.get_running_loop())
+        inbox.linger_s = 0.001
+        waiting = asyncio.create_task(inbox.wait())
+        for n in range(5):
+            inbox.offer(Sample(f"k/{n}", b""))
+            await asyncio.sleep(0)
+            assert not waiting.done()
+        await waiting
+        return inbox.take()
+
+    assert [event.key for event in asyncio.run(scenario()) if isinstance(event, Sample)] == [
+        f"k/{n}" for n in range(5)
+    ]
