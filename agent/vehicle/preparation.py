@@ -104,8 +104,6 @@ class Preparation:
         self._failsafes = FailsafeCheck(firmware, session)
         self._limits = LimitsCheck(firmware, session, order.speed_m_s)
         self._runway = RunwayCheck(firmware, session, order.runway)
-        self._rising_s = -math.inf
-        """When it was last seen to take off in a mode of its own."""
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
         self.done = False
@@ -237,7 +235,7 @@ class Preparation:
         self._session.say(*self._takeoff.command.cancel(self._session.now_s))
         if self._arm.command.given:  # what it does without us may not have been read to the end
             self._failsafes.ask()
-        if self._session.now_s < self._rising_s + self._firmware.steadies_s:
+        if self._session.lets_rise:
             self.waiting_for = "letting it fly steadily after takeoff"
         elif not self._climbing or self._high_enough(position):
             self._climbing = False
@@ -307,7 +305,7 @@ class Preparation:
 
     def _follow_takeoff(self) -> None:
         """Wait for the end of a takeoff that the vehicle carries out in a mode of its own."""
-        self._saw_takeoff, self._rising_s = True, self._session.now_s
+        self._saw_takeoff = True
         if not self.took_off:
             # An earlier life's, or a pilot's.
             self._flown_by_pilot = self._consent.needed

@@ -161,8 +161,8 @@ def test_command_that_returns_no_status_is_a_bug() -> None:
          "shipped scenario: airstrip, hayfield, meadow, orchard, reservoir-inspection, ridge, "
          "roundup, table-1, valley-popups, valley-survey, vineyard")),
         (["plan", "table1"], ("table1: no such scenario file; did you mean 'table-1'? Shipped "
-         "scenarios: airstrip, hayfield, meadow, orchard, reservoir-inspection, ridge, roundup, table-1, "
-         "valley-popups, valley-survey, vineyard")),
+         "scenarios: airstrip, hayfield, meadow, orchard, reservoir-inspection, ridge, roundup, "
+         "table-1, valley-popups, valley-survey, vineyard")),
         (["task"], "swarm task: missing command; SEE"),
         (["task", "ad"], "swarm task: no such command 'ad'; did you mean 'add'? SEE"),
         (["task", "add"], "swarm task add: missing argument 'name'; SEE"),
