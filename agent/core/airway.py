@@ -27,6 +27,7 @@ from agent.core.interface import (
     Hold,
     Home,
     Landed,
+    MotorsRun,
     OrderVehicle,
     Prepare,
     Refused,
@@ -129,8 +130,9 @@ class Airway:
                 return replace(event, position_enu_m=nominal_enu_m)
             case VehicleReady():
                 self._aloft = True
-                if (way := self._told_way).grounded:
-                    self._way = lifted(way, self._fleet.hovers_first_enu_m)
+                self._way = lifted(self._told_way, self._fleet.hovers_first_enu_m)
+            case MotorsRun(ours=True) if self._told_way.flies:
+                self._way = replace(self._told_way, grounded=False)  # it may have left the ground
             case Arrived(leg=leg) if leg == self._flown_leg:
                 self._arrive(self._told_way)
             case Held():
@@ -191,18 +193,16 @@ class Airway:
         corners = self._fleet.corners(order, here)
         # Home, a vehicle goes down to its own layer above its start by itself.
         own_height |= isinstance(order, Return) and not order.land
-        now_s = self._mission_view.now_s
         high = self._own_height if self._moves else self._at_own_height
-        self._wish = Wish(order, now_s, corners, own_height, fixed, high, takes_s=takes_s)
+        wished = order, self._mission_view.now_s, corners, own_height, fixed, high, takes_s
+        self._wish = Wish(*wished)
         self._aside = None
         if not self._aloft:
             self._stands_at = self._stands_at or self._fleet.standing()
         elif self._moves and not self._stops:
-            left = (
-                None
-                if self._own_height != own_height or self._place is None
-                else left_of_way(self._told_way, self._place, corners, self._wish.end_enu_m)
-            )
+            left = None
+            if self._own_height == own_height and self._place is not None:
+                left = left_of_way(self._told_way, self._place, corners, self._wish.end_enu_m)
             if left is None:
                 self._stop()
             else:

@@ -92,7 +92,9 @@ def landed(way: ClaimedWay) -> ClaimedWay:
 
 
 def lifted(way: ClaimedWay, hovers_enu_m: tuple[Point, ...]) -> ClaimedWay:
-    """In the air, somewhere on ``way``; without one where it hovers first [m]."""
+    """In the air after all that ``way`` says, somewhere on it, or where it hovers first [m]."""
+    if not way.grounded:
+        return way
     path = way.path_enu_m or hovers_enu_m
     return replace(way, path_enu_m=path, flies=bool(path), grounded=False)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agent.core.interface import Held, Prepare, VehicleReady
+from agent.core.interface import Held, Home, MotorsRun, Prepare, VehicleReady
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.protocol.messages import CommandKind, OperatorCommand
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
@@ -77,4 +77,16 @@ def test_who_ends_without_having_taken_off_keeps_no_air() -> None:
 
     command(agent, CommandKind.ABORT)
 
+    assert is_home(own_claim(agent))
+
+
+def test_who_may_be_on_its_way_up_keeps_that_air_until_it_has_landed() -> None:
+    agent = on_the_ground()
+    agent.happen(MotorsRun(ours=True))
+
+    command(agent, CommandKind.RETURN)
+
+    assert own_claim(agent).phase is ClaimPhase.OUT
+    assert not lets_through(agent)
+    agent.happen(Home())
     assert is_home(own_claim(agent))
