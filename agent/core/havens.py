@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from agent.core.base_visits import BaseVisits
 from agent.core.context import AgentContext, AgentPart
 from agent.core.decision import RefusedTasks
@@ -15,6 +17,7 @@ from agent.core.energy import TOLERANCE_S, SortieClock
 from agent.core.flights import Flights, HomeFlight
 from agent.core.states import AgentState
 from swarm.allocation import field
+from swarm.model import BaseId, UavId
 from swarm.protocol import bases
 from swarm.protocol.field_messages import BaseSpec
 
@@ -67,16 +70,40 @@ class Havens(AgentPart):
         return base.id not in self._refused.left_alone(now_s) and not self._visits.is_blocked(base)
 
     def home(self, now_s: float) -> HomeFlight | None:
-        """The nearest home, but another base in reach where that is a base of no use."""
+        """The nearest home, but another base in reach where that is a base of no use.
+
+        Or where that is its start, from where it does not come back, and tasks are open that it
+        could do with another battery: whoever is to do them may be lost.
+        """
         nearest = self._flights.way_home()
         base = None if nearest is None or nearest.base is None else self._base(nearest.base)
-        if nearest is None or base is None or self.is_usable(base, now_s):
+        if nearest is None or (base is not None and self.is_usable(base, now_s)):
             return nearest
-        found = min(self._within_reach(now_s), key=_arrival, default=None)
+        if base is None and self._machine.state is not AgentState.IDLE:
+            return nearest
+        reached = self._within_reach(now_s)
+        if base is None:
+            reached = [haven for haven in reached if self._leads_on(haven)]
+        found = min(reached, key=_arrival, default=None)
         if found is None:
             return nearest
         way = found.way
         return HomeFlight(way.via_enu_m, way.end_enu_m, found.base.id, way.duration_s)
+
+    def _leads_on(self, haven: Haven) -> bool:
+        """Whether a task is open that the UAV could do alone from there, with a full battery."""
+        problem = self._flights.problem
+        if problem is None or self._uav not in problem.uav_ids:
+            return False
+        row, base = problem.uav_ids.index(UavId(self._uav)), BaseId(haven.base.id)
+        leg_s = problem.leg_s[problem.kind[row], problem.n_uav + problem.base_ids.index(base)]
+        there = np.array([self._mission_view.is_open(task) for task in problem.task_ids], bool)
+        enter, leave = problem.enter, problem.enter[:, ::-1]
+        line_s = problem.line_s[problem.kind[row]] + problem.service_s[:, None]
+        in_time = np.maximum(haven.ready_s + leg_s[enter], problem.opens_s[:, None])
+        in_time = in_time <= problem.closes_s[:, None]
+        lasts = leg_s[enter] + line_s + problem.home_s[row][leave] <= problem.full_s[row]
+        return bool((in_time & lasts & (there & problem.capable[row])[:, None]).any())
 
     def reach(self, name: str, now_s: float) -> Haven | None:
         """That base, flown to from here; None if it is unknown, or zones leave no way."""

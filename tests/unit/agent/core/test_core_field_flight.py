@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import pytest
@@ -296,6 +297,30 @@ def test_with_nothing_to_do_it_goes_to_its_start_for_good_if_that_is_nearest(
     assert agent.way_home.via_enu_m == ABOVE_START
     assert agent.way_home.land
     assert agent.phase is ClaimPhase.OUT
+
+
+@pytest.mark.parametrize(("east_m", "goes_on"), [(60.0, True), (300.0, False)])
+def test_with_nothing_to_do_but_a_task_open_it_goes_for_another_battery(
+    script: Script, east_m: float, goes_on: bool
+) -> None:
+    """Somebody else is to do it, who may be lost; but not where no battery lasts for it."""
+    agent = FieldAgent(bases=[FAR_BASE])
+    agent.fly_to(entry("t0", 40.0), entry("t1", east_m, number=1))
+    script.items = ["t0"]
+    agent.start_mission()
+    agent.run_until(39.0)
+    agent.arrive(40.0)
+    way_s = math.hypot(40.0, 300.0)
+
+    agent.run_until(BUDGET_S - way_s - agent.timing.patience_s - 0.1)
+    assert agent.state() is AgentState.IDLE
+    agent.run_until(BUDGET_S - way_s)
+    assert agent.state() is (AgentState.FLYING_TO_BASE if goes_on else AgentState.IDLE)
+    assert agent.claim is not None
+    assert agent.claim.base == ("b1" if goes_on else None)
+    if not goes_on:
+        agent.run_until(BUDGET_S - 40.0)
+        assert agent.state() is AgentState.RETURNING_VIA_START
 
 
 # -- the way home --------------------------------------------------------------------------
