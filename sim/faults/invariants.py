@@ -71,6 +71,8 @@ _NEAR_M = 1e-3
 """What is forgiven of distances."""
 TELEMETRY_S = 0.2
 """Agents hear that often where their vehicles are [s]."""
+_SPENT = "its battery "
+"""So begins why an agent brings its UAV home before that falls."""
 _IN_FLIGHT = (StatusPhase.FLYING, StatusPhase.SERVING)
 
 
@@ -176,7 +178,8 @@ class InvariantChecker:
         if note.text == "no way" and "task" in note.fields:
             self.message_log.refused(process.name, str(note.fields["task"]))
         self.shut_air.noted(process, note)
-        used_up = note.text == "returning" and _is_held(process)
+        is_spent = note.text == "returning" and str(note.fields["reason"]).startswith(_SPENT)
+        used_up = is_spent and _is_held(process)
         if used_up:
             self._used_up.add(process.name)
         if used_up or note.text == "lands where it is":
