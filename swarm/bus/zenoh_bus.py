@@ -47,6 +47,7 @@ from swarm.bus.zenoh_session import (
     plain_error,
     session_config,
     session_config_file,
+    threads_for,
 )
 from swarm.protocol.seal import Seal, seal_of
 from swarm.runtime.errors import BusError
@@ -107,7 +108,8 @@ async def _open(config: BusConfig, timeout_s: float) -> zenoh.Session:
 
         secure(settings, identity, mode, identity.roster)
     try:
-        return await open_session(settings, timeout_s=timeout_s)
+        with threads_for(mode):
+            return await open_session(settings, timeout_s=timeout_s)
     except BusError as fault:
         from swarm.bus.tls import why_refused, with_keys_only
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import json
+import os
 import re
 import threading
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future
 from pathlib import Path
+from typing import Final
 
 import zenoh
 
@@ -27,6 +30,13 @@ BLOCKED_CLOSE_S = 0.5
 """A link whose queue does not move for this long is closed, so that one hung reader holds
 the others up no longer."""
 HEADERS_BYTES = 64 << 10
+_RUNTIME: Final = "ZENOH_RUNTIME"
+_CLIENT_RUNTIME: Final = (
+    "(rx: (handover: net), tx: (handover: net), app: (handover: net), acc: (handover: net),"
+    " net: (worker_threads: 2))"
+)
+"""A client's threads do all its work by turns; by default each sample wakes three, one after another.
+Routers and peers wait on theirs for congested links, so that others must be there to send."""
 DEFAULT_MODE = "peer"
 """Of a Zenoh configuration file that names none."""
 
@@ -101,6 +111,22 @@ def endpoints_of(config: zenoh.Config, side: str) -> list[str]:
     if isinstance(named, dict):
         named = named.get(mode) or []
     return [str(each) for each in named]
+
+
+@contextlib.contextmanager
+def threads_for(mode: str) -> Iterator[None]:
+    """In it Zenoh gets the threads that it keeps in this process, with the first session.
+
+    What a user has set stays. What is set here is for nobody that this process starts.
+    """
+    if mode != "client" or _RUNTIME in os.environ:
+        yield
+        return
+    os.environ[_RUNTIME] = _CLIENT_RUNTIME
+    try:
+        yield
+    finally:
+        os.environ.pop(_RUNTIME, None)
 
 
 async def open_session(config: zenoh.Config, *, timeout_s: float) -> zenoh.Session:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -281,6 +282,36 @@ def test_dead_network_holds_up_neither_the_loop_nor_closing_nor_the_exit() -> No
     assert asked_s < 0.6 + late_s
     assert closed_s < 2.5 + late_s  # the session alone would take 10 s
     assert answers == 0
+
+
+THREADS = """
+import asyncio, os, sys
+from pathlib import Path
+from swarm.bus.config import BusConfig, ClientTopology
+from swarm.bus.zenoh_bus import open_zenoh_bus
+
+async def main(endpoint):
+    bus = await open_zenoh_bus(BusConfig(ClientTopology((endpoint,))))
+    bus.publish("mine", b"said")
+    await bus.query("state/*", timeout_s=5.0)
+    bus.close()
+
+asyncio.run(main(sys.argv[1]))
+threads = Path("/proc/self/task").glob("*/comm")
+names = {path.read_text().partition("-")[0].strip() for path in threads}
+print(sorted(names & {"app", "net", "rx", "tx"}), os.environ.get("ZENOH_RUNTIME"))
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="tells no names of threads")
+def test_a_client_reads_delivers_and_sends_on_the_same_threads() -> None:
+    with (
+        router("--listen", "tcp/127.0.0.1:0") as (_, endpoint),
+        started("-c", THREADS, endpoint) as client,
+    ):
+        status, out, err = finish(client)
+
+    assert (status, out) == (0, "['net'] None\n"), err
 
 
 UNCLOSED = """
