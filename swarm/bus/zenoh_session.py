@@ -35,8 +35,8 @@ _CLIENT_RUNTIME: Final = (
     "(rx: (handover: net), tx: (handover: net), app: (handover: net), acc: (handover: net),"
     " net: (worker_threads: 2))"
 )
-"""A client's threads do all its work by turns; by default each sample wakes three, one after another.
-Routers and peers wait on theirs for congested links, so that others must be there to send."""
+"""A client's threads do all its work by turns; by default each sample wakes three of them. Routers
+and peers wait on theirs for congested links, so that others must be there to send."""
 DEFAULT_MODE = "peer"
 """Of a Zenoh configuration file that names none."""
 
