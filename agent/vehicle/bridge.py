@@ -259,7 +259,6 @@ class Bridge:
             session.commands.cancel_all()
             if isinstance(self._activity, Preparing):
                 self._activity.begin_anew()
-        session.heed_takeoff(heartbeat)
         self._check_authority(heartbeat)
         self._check_guards()
 

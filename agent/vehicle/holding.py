@@ -129,8 +129,6 @@ class Holding(Activity):
             self.done = True
         elif not self.aloft:
             self._tell(self._disarm, self._firmware.disarm())
-        elif self._session.lets_rise:
-            pass  # it would sink
         elif not self._firmware.is_commanded(heartbeat.custom_mode):
             # The guided mode begins with a stop, which is given the time to be seen.
             self._told = True

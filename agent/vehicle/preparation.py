@@ -235,9 +235,7 @@ class Preparation:
         self._session.say(*self._takeoff.command.cancel(self._session.now_s))
         if self._arm.command.given:  # what it does without us may not have been read to the end
             self._failsafes.ask()
-        if self._session.lets_rise:
-            self.waiting_for = "letting it fly steadily after takeoff"
-        elif not self._climbing or self._high_enough(position):
+        if not self._climbing or self._high_enough(position):
             self._climbing = False
             self._settle(position)
 

@@ -141,7 +141,7 @@ class Returning(Activity):
     def advance(self) -> None:
         """Set the mode as long as it is not seen and the vehicle still takes our orders."""
         session, heartbeat = self._session, self._session.vehicle.heartbeat
-        if heartbeat is None or (heartbeat.armed and session.lets_rise):
+        if heartbeat is None:
             return
         if self._return_via is not None:
             if not self._seen:

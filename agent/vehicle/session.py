@@ -17,7 +17,7 @@ from agent.vehicle.contact import Contact
 from agent.vehicle.conversation import Conversation
 from agent.vehicle.firmware import unsupported
 from agent.vehicle.firmware.profile import Firmware
-from agent.vehicle.messages import Heartbeat, Inbound
+from agent.vehicle.messages import Inbound
 from agent.vehicle.onboard_fence import OnboardFence
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.parameter_override import ParameterOverride
@@ -136,8 +136,6 @@ class VehicleSession(Conversation):
         self._zones: Sequence[Zone] = config.zones
         self.launched_enu_m: Point | None = None
         """Where it took off on our order, to which its return mode leads; None: not known."""
-        self._rising_s = -math.inf
-        """When it was last seen to take off in a mode of its own."""
         self.tells_charge = False
         """Whether it has ever told the charge of its batteries."""
         self.cruise_watch = CruiseWatch()
@@ -155,17 +153,6 @@ class VehicleSession(Conversation):
         if not firmware.traits.stays:
             return ArrivalRule(max(radius_m, _CIRCLE_FRAC * self.circle_m), passes=True)
         return ArrivalRule(max(radius_m, firmware.stops_within_m), firmware.traits.drives)
-
-    def heed_takeoff(self, heartbeat: Heartbeat) -> None:
-        """See whether it takes off."""
-        firmware = self.firmware
-        if heartbeat.armed and firmware and firmware.is_taking_off(heartbeat.custom_mode):
-            self._rising_s = self.now_s
-
-    @property
-    def lets_rise(self) -> bool:
-        """Whether it takes off, or has just done so, and is to be told nothing meanwhile."""
-        return self.firmware is not None and self.now_s < self._rising_s + self.firmware.steadies_s
 
     @property
     def circle_m(self) -> float:

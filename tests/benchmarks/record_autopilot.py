@@ -4,7 +4,8 @@ Start firmware in software-in-the-loop as `swarm run` does (sim.fleet.firmware s
 instance), then: ``python -m tests.benchmarks.record_autopilot LINK PLAY FILE --speedup N``. A
 LINK is ``tcp:HOST:PORT`` (ArduCopter) or ``udpin:HOST:PORT`` (PX4), N the firmware's own speed-up.
 For the refusals before a position is known it must have been started just before. Plays:
-``flight``, and a failure each: ``ground-lost``, ``battery-low``, ``gps-lost``. Orders, missions
+``flight``, ``runway`` of a plane, and a failure each: ``ground-lost``, ``battery-low``,
+``gps-lost``. Orders, missions
 and parameters are those of the bridge, put into frames by its codec; the failures are settings of
 the firmware's own simulator. Reports that repeat a state are thinned, messages that the bridge
 does not look at are left out, and so are parameters that nobody asked for.
@@ -24,15 +25,18 @@ from typing import Any, Final, Protocol, TextIO
 
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from agent.core.interface import Runway
 from agent.vehicle.codec import MavlinkCodec
 from agent.vehicle.firmware import firmware_of
 from agent.vehicle.firmware.profile import Firmware
+from agent.vehicle.landing_pattern import RunwayLanding
 from agent.vehicle.messages import (
     CommandInt,
     CommandLong,
     GroundHeartbeat,
     Inbound,
     LandedState,
+    MissionItem,
     MissionSetCurrent,
     Outbound,
     ParameterRead,
@@ -42,6 +46,7 @@ from agent.vehicle.messages import (
 from agent.vehicle.mission_plan import MissionPlan, MissionSeqs
 from agent.vehicle.mission_transfer import MissionInForce, MissionPolicy, MissionTransfer
 from agent.vehicle.state import VehicleState
+from swarm.model.frames import Origin
 from swarm.runtime.clock import SystemClock
 
 CLOCK: Final = SystemClock()
@@ -282,11 +287,11 @@ class Ground:
             for answer in self._transfer.on_message(message, now_s):
                 self._put(self.codec.encode(answer))
 
-    def upload(self, plan: MissionPlan) -> None:
+    def upload(self, items: Sequence[MissionItem]) -> None:
         """Put a mission on the vehicle, and read it back."""
         assert self.codec is not None
         self._transfer = transfer = MissionTransfer(MissionPolicy())
-        for message in transfer.upload(plan.items(self.flavour), CLOCK.now_s()):
+        for message in transfer.upload(items, CLOCK.now_s()):
             self._put(self.codec.encode(message))
         self.wait(lambda: transfer.result is not None, "the mission")
         if not isinstance(transfer.result, MissionInForce):
@@ -378,7 +383,7 @@ def flight(ground: Ground) -> None:
     ground.say(ground.go(300.0))
     ground.listen(4.0)
     target = ground.place(-10.0)
-    ground.upload(MissionPlan(*target, ground.height(12.0), 4.0, 3))
+    ground.upload(MissionPlan(*target, ground.height(12.0), 4.0, 3).items(ground.flavour))
     ground.listen(3.0)
     ground.say(MissionSetCurrent(MissionSeqs(ground.flavour.mission_vehicle_items).speed))
     ground.say(ground.flavour.set_mission_mode())
@@ -438,8 +443,35 @@ def gps_lost(ground: Ground) -> None:
     ground.listen(6.0)
 
 
+def runway(ground: Ground) -> None:
+    """A plane takes off, flies to a target and lands as it was told before."""
+    ground.streams()
+    ground.read(*(name for names in ground.flavour.failsafe_names for name in names))
+    ground.read(*ground.flavour.landing_names)
+    ground.ready()
+    position = ground.state.position
+    assert position is not None
+    origin = Origin(position.lat_deg, position.lon_deg, ground.height(0.0))
+    landing = RunwayLanding(80.0, math.radians(5.0))
+    ground.upload(landing.items(Runway((0.0, 0.0, 0.0), 0.0), origin))
+    ground.listen(3.0)
+    ground.say(ground.flavour.arm())
+    ground.wait(lambda: ground.state.armed, "motors")
+    ground.say(ground.flavour.takeoff(ground.height(40.0), ground.height(0.0)))
+    ground.wait(lambda: ground.flavour.is_taking_off(ground.mode()), "the take-off")
+    ground.wait(lambda: ground.flavour.is_commanded(ground.mode()), "the height")
+    ground.listen(5.0)
+    target = (*ground.place(300.0), ground.height(0.0) + 45.0, 12.0)
+    ground.say(ground.flavour.reposition(*target))
+    ground.listen(40.0)
+    ground.say(ground.flavour.set_return_mode())
+    ground.wait(lambda: ground.flavour.is_returning(ground.mode()), "the return")
+    ground.down()
+
+
 PLAYS: Final = {
     "flight": flight,
+    "runway": runway,
     "ground-lost": ground_lost,
     "battery-low": battery_low,
     "gps-lost": gps_lost,

@@ -26,7 +26,6 @@ from agent.core.interface import (
     Prepare,
     Refused,
     Return,
-    ReturnBegun,
     Runway,
     Swap,
     Swapped,
@@ -251,49 +250,6 @@ def test_a_plane_takes_off_the_way_it_stands_and_lands_along_its_runway() -> Non
     *_, before, _ = (at for at in flight.track_enu_m[seen:] if 1.0 < at[2] < 20.0)
     assert before[1] == pytest.approx(HOME_M[1], abs=0.1)
     assert before[0] < HOME_M[0]
-
-
-def rising() -> JoinedFlight:
-    """Of a plane, on its way up."""
-    flight = joined(VehicleKind.PLANE)
-    flight.to_bridge(STARTS[VehicleKind.PLANE])
-    while flight.vehicle.pilot.position_enu_m(flight.now_s)[2] < 5.0:
-        flight.wait(0.5)
-    assert flight.vehicle.pilot.mode is FlightMode.TAKEOFF
-    return flight
-
-
-@pytest.mark.parametrize(
-    ("order", "mode"),
-    [
-        (Hold("the operator says so"), FlightMode.LOITER),
-        (Return("the operator says so", via_enu_m=(*HOME_M[:2], 30.0)), FlightMode.RTL),
-    ],
-)
-def test_a_plane_that_takes_off_is_let_rise_before_it_is_stopped_or_called_home(
-    order: Hold | Return, mode: FlightMode
-) -> None:
-    flight = rising()
-    pilot = flight.vehicle.pilot
-    flight.to_bridge(order)
-    while pilot.mode is FlightMode.TAKEOFF:
-        flight.wait(0.5)
-    up_s = flight.now_s
-    assert pilot.position_enu_m(up_s)[2] == pytest.approx(30.0, abs=0.1)
-    flight.run_until(Held() if isinstance(order, Hold) else ReturnBegun)
-    assert flight.now_s - up_s >= 8.0
-    assert pilot.mode is mode
-
-
-def test_no_target_is_told_before_a_plane_flies_steadily() -> None:
-    flight = rising()
-    pilot = flight.vehicle.pilot
-    while pilot.mode is FlightMode.TAKEOFF:
-        flight.wait(0.5)
-    flight.wait(8.0)
-    assert flight.waits_for == "letting it fly steadily after takeoff"
-    assert away_m(flight, HOME_M) > CIRCLE_M
-    flight.run_until(VehicleReady())
 
 
 def test_the_landing_stands_on_a_plane_whatever_becomes_of_its_agent() -> None:

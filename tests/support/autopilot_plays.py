@@ -28,8 +28,10 @@ from sim.autopilot.faults import FaultKind, VehicleFault
 from sim.autopilot.firmware.ardupilot import ArduCopterModel
 from sim.autopilot.firmware.model import FirmwareModel
 from sim.autopilot.firmware.px4 import Px4Model
+from sim.autopilot.firmware.px4_plane import Px4PlaneModel
 from sim.autopilot.vehicle import SimulatedAutopilot
 from swarm.model.frames import Origin
+from swarm.model.vehicles import VehicleKind
 from tests.support.ground_station import GroundStation
 
 RECORDINGS = Path(__file__).parents[1] / "data" / "recordings"
@@ -367,6 +369,13 @@ PX4_READY = Delays(1.0, 1.0, 1.0, 1.0)
 COPTER_BOOTS = Delays(2.5, 15.0, 20.0, 41.4)
 PX4_BOOTS = Delays(2.5, 2.5, 2.5, 2.5)
 TURNS = {"acceleration_m_s2": 2.5, "rounds_corners": True}
+PX4_RUNWAY = {
+    "vehicle": VehicleKind.PLANE,
+    "circle_m": 80.0,
+    "cruise_m_s": 12.5,
+    "climb_m_s": 2.7,
+    "spool_up_s": 1.0,
+}
 PX4_FLIGHT = {"spool_up_s": 1.5, "climb_m_s": 1.2, "land_m_s": 1.4, "cruise_m_s": 5.0}
 
 PLAYS = {
@@ -418,6 +427,7 @@ PLAYS = {
         {**ARDUCOPTER, "land_m_s": 0.35},
     ),
     "PX4's fence": Play("px4-1.17-fence.jsonl", 3.0, Px4Model(), PX4_BOOTS, 487.8, PX4_FLIGHT),
+    "PX4's runway": Play("px4-1.17-runway.jsonl", 2.0, Px4PlaneModel(), PX4_READY, 2.0, PX4_RUNWAY),
     "ArduCopter's camera": Play(
         "arducopter-4.8-camera.jsonl", 4.0, ArduCopterModel(), COPTER_BOOTS, 488.1, ARDUCOPTER
     ),

@@ -74,8 +74,6 @@ class Firmware(ABC):
     """For people."""
     takes_missions: ClassVar[bool] = True
     """Whether it is known how to command it by missions."""
-    steadies_s: ClassVar[float] = 0.0
-    """For how long it is told nothing once it has taken off."""
     landing_names: ClassVar[tuple[str, ...]] = ()
     """Parameters that say how it lands along a runway."""
     stops_within_m: ClassVar[float] = 0.0

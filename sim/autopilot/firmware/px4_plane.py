@@ -3,8 +3,8 @@
 It takes off straight ahead, waits on circles, and returns to the landing that stands on it as a
 mission: it climbs to the return height where it is, circles down before the runway, leaves the
 circle on a tangent and touches down. Without such a landing it circles over home for good. Leaves
-out: launches, the height that it loses just after a take-off, landings that are broken off, and
-how it flies the landing as a mission.
+out: launches, dives after take-off, landings that are broken off, and how it flies the landing as a
+mission.
 
 Sources: flights of PX4 1.17 (SIH airplane); rtl.cpp and rtl_direct_mission_land.cpp of its
 navigator; https://docs.px4.io/main/en/flight_modes_fw/.

@@ -27,7 +27,7 @@ def test_the_tangent_of_the_circle_is_the_line(
     ahead_east, ahead_north = math.sin(heading_rad), math.cos(heading_rad)
     behind_m = -(away_east_m * ahead_east + away_north_m * ahead_north)
     right_m = away_east_m * ahead_north - away_north_m * ahead_east
-    assert behind_m == pytest.approx(landing.line_m)
+    assert behind_m == pytest.approx(landing.line_m + 100.0)
     assert right_m == pytest.approx(landing.circle_m)
 
 
@@ -39,9 +39,15 @@ def test_the_line_is_less_steep_than_the_plane_may_descend(landing: RunwayLandin
 
 def test_the_items_begin_the_landing_circle_down_and_touch_down_at_the_place() -> None:
     runway = Runway((40.0, -20.0, 2.0), math.pi / 2.0)
-    begin, circle, ground = RunwayLanding(80.0, math.radians(5.0)).items(runway, ORIGIN)
-    assert [item.command for item in (begin, circle, ground)] == [189, 31, 21]
-    assert [item.seq for item in (begin, circle, ground)] == [0, 1, 2]
+    landing = RunwayLanding(80.0, math.radians(5.0))
+    items = landing.items(runway, ORIGIN)
+    _, circle, high, low, ground = items
+    assert [item.command for item in items] == [189, 31, 16, 16, 21]
+    assert [item.seq for item in items] == [0, 1, 2, 3, 4]
+    for item, frac in ((high, 1.0), (low, 0.7)):
+        place_enu_m = enu_from_wgs84(ORIGIN, item.lat_deg, item.lon_deg, item.alt_m)
+        on_line_m = (40.0 - frac * landing.line_m, -20.0, 2.0 + frac * 25.0)
+        assert place_enu_m == pytest.approx(on_line_m, abs=0.02)
     assert circle.params == (1.0, 80.0, 0.0, 1.0)
     assert {circle.frame, ground.frame} == {AltitudeFrame.MEAN_SEA_LEVEL}
     place_enu_m = enu_from_wgs84(ORIGIN, ground.lat_deg, ground.lon_deg, ground.alt_m)
