@@ -160,7 +160,7 @@ def _plotted(view: UavView) -> PlottedUav:
         id=view.id,
         does=view.now_does,
         goal=view.goal,
-        battery_frac=view.battery_frac,
+        battery_frac=_shown(view.battery_frac),
         speed_m_s=None if velocity is None else _shown(math.hypot(*velocity)),
         up_m=None if place is None else _shown(place[2]),
         eta_s=_shown(view.now_eta_s),

@@ -9,6 +9,7 @@
 # The engine is the first of docker and podman that answers, or ENGINE; COMPOSE is how to compose,
 # by default `docker compose` or `podman-compose`. Needs the project's .venv, the base image or a
 # registry that has it, Debian's packages and the package index.
+# The log, and the machines' keys, are in build/check-image, or in FOLDER.
 # Exit status 0: nothing that was tried has failed. Without an engine nothing is tried.
 #
 # Containers, networks and volumes are named peckorder-check…, and gone at the end; the images
@@ -19,7 +20,7 @@ set -eu
 
 project=$(cd "$(dirname "$0")/../.." && pwd)
 python=$project/.venv/bin/python
-folder=$project/build/check-image
+folder=${FOLDER:-$project/build/check-image}
 recipe=$project/deploy/Containerfile
 name=peckorder-check
 parts=${*:-demo workshop compose machines}
@@ -51,6 +52,8 @@ within() {
     done
 }
 answers() { command -v "$1" >/dev/null && "$1" info >/dev/null 2>&1; }
+# waits_for_others COMPOSER: podman-compose 1.0 does not, and starts agents before there are keys
+waits_for_others() { "$1" --version 2>/dev/null | grep -Eq 'compose version ([2-9]|1\.[1-9])'; }
 at_hand() { "$engine" image inspect "$1" >/dev/null 2>&1 || "$engine" pull "$1"; }
 inspect() { "$engine" inspect --format "$1" "$2"; }
 free_port() { "$python" -c 'import socket; s = socket.socket(); s.bind(("", 0)); print(s.getsockname()[1])'; }
@@ -210,8 +213,7 @@ machines() {
 # -- from the engine to the last word -------------------------------------------------------
 
 clean() {
-    local fleet ids kind
-    trap - EXIT INT TERM
+    local it fleet ids kind
     for it in demo flight workshop; do
         "$engine" rm --force "$name-$it" >/dev/null 2>&1 || true
     done
@@ -234,52 +236,65 @@ nothing_is_tried() {
     exit 0
 }
 
-[ -x "$python" ] || { echo "image.sh: no .venv here: make .venv/.installed-dev" >&2; exit 1; }
-for part in $parts; do
-    case $part in
-    demo | workshop | compose | machines) ;;
-    *) echo "image.sh: no part $part: demo, workshop, compose or machines" >&2; exit 1 ;;
-    esac
-done
-engine=${ENGINE:-}
-for it in docker podman; do
-    [ -n "$engine" ] || ! answers "$it" || engine=$it
-done
-[ -n "$engine" ] && answers "$engine" || nothing_is_tried "No engine answers: neither Docker nor Podman"
-mkdir -p "$folder"
-: >"$folder/log"
-base=$(sed -n 's/^ARG BASE=//p' "$recipe")
-at_hand "$base" >>"$folder/log" 2>&1 ||
-    nothing_is_tried "The base image $base is not here, and no registry gives it to $engine"
-compose=${COMPOSE:-}
-if [ -n "$compose" ]; then
-    :
-elif [ "$engine" = docker ] && docker compose version >/dev/null 2>&1; then
-    compose="docker compose"
-elif [ "$engine" = podman ] && command -v podman-compose >/dev/null; then
-    compose=podman-compose
-fi
-address=$(hostname -I | cut -d " " -f 1)
-export PECKORDER_IMAGE=$name-fleet
-
-trap clean EXIT
-trap 'exit 130' INT TERM
-clean
-trap clean EXIT
-trap 'exit 130' INT TERM
-echo "$("$engine" --version), base $base${compose:+, $compose}"
-case " $parts " in
-*" compose "* | *" machines "*)
-    if [ -z "$compose" ]; then
-        not_tried "compose, machines: there is no \`docker compose\`, and no podman-compose for Podman"
-        parts=$(printf '%s\n' $parts | grep -vx 'compose\|machines' || true)
-    elif try "the image of every process is built" build fleet; then
-        ok "the image of every process: $(megabytes "$name-fleet") MB"
-    else
-        parts=$(printf '%s\n' $parts | grep -vx 'compose\|machines' || true)
+choose_engine() {
+    local it
+    engine=${ENGINE:-}
+    for it in docker podman; do
+        [ -n "$engine" ] || ! answers "$it" || engine=$it
+    done
+    [ -n "$engine" ] && answers "$engine" ||
+        nothing_is_tried "No engine answers: neither Docker nor Podman"
+    base=$(sed -n 's/^ARG BASE=//p' "$recipe")
+    at_hand "$base" >>"$folder/log" 2>&1 ||
+        nothing_is_tried "The base image $base is not here, and no registry gives it to $engine"
+}
+choose_composer() {
+    compose=${COMPOSE:-}
+    if [ -n "$compose" ]; then
+        :
+    elif [ "$engine" = docker ] && docker compose version >/dev/null 2>&1; then
+        compose="docker compose"
+    elif [ "$engine" = podman ] && waits_for_others podman-compose; then
+        compose=podman-compose
     fi
-    ;;
-esac
-for part in $parts; do "$part"; done
-[ "$failed" = 0 ] || { echo "$failed checks have failed"; exit 1; }
-echo "all that was tried is well"
+}
+# can_compose: there is a composer, and the image that it starts
+can_compose() {
+    if [ -z "$compose" ]; then
+        not_tried "compose, machines: there is no \`docker compose\`, or for Podman no podman-compose from 1.1 on"
+        return 1
+    fi
+    try "the image of every process is built" build fleet || return 1
+    ok "the image of every process: $(megabytes "$name-fleet") MB"
+}
+
+main() {
+    local part
+    [ -x "$python" ] || { echo "image.sh: no .venv here: make .venv/.installed-dev" >&2; exit 1; }
+    for part in $parts; do
+        case $part in
+        demo | workshop | compose | machines) ;;
+        *) echo "image.sh: no part $part: demo, workshop, compose or machines" >&2; exit 1 ;;
+        esac
+    done
+    mkdir -p "$folder"
+    : >"$folder/log"
+    choose_engine
+    choose_composer
+    address=$(hostname -I | cut -d " " -f 1)
+    export PECKORDER_IMAGE=$name-fleet
+    clean
+    trap clean EXIT
+    trap 'exit 130' INT TERM
+    echo "$("$engine" --version), base $base${compose:+, $compose}"
+    case " $parts " in
+    *" compose "* | *" machines "*)
+        can_compose || parts=$(printf '%s\n' $parts | grep -vx 'compose\|machines' || true)
+        ;;
+    esac
+    for part in $parts; do "$part"; done
+    [ "$failed" = 0 ] || { echo "$failed checks have failed"; exit 1; }
+    echo "all that was tried is well"
+}
+# Read to its end before it begins: an editor may write this file while it runs.
+main; exit

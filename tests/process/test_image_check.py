@@ -28,6 +28,7 @@ def checked(folder: Path, *words: str, fails: str) -> subprocess.CompletedProces
     return subprocess.run(
         [CHECK, *words],
         env={"PATH": f"{folder}:{os.environ['PATH']}", "ENGINE": "docker",
+             "FOLDER": str(folder / "check"),
              "ASKED": str(folder / "asked")},
         capture_output=True,
         text=True,

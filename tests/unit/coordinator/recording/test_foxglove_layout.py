@@ -112,6 +112,13 @@ def test_each_panel_has_its_place() -> None:
     assert sorted(leaves(LAYOUT["layout"])) == sorted(PANELS)
 
 
+def test_each_panel_has_its_name_in_both_families_of_viewers() -> None:
+    names = [panel["foxglovePanelTitle"] for panel in PANELS.values()]
+
+    assert [panel["lichtblickPanelTitle"] for panel in PANELS.values()] == names
+    assert len(set(names)) == len(names)
+
+
 def test_the_scene_panel_shows_every_scene_of_a_flown_mission_and_nothing_else(
     recorded: Recorded,
 ) -> None:
