@@ -16,8 +16,9 @@ from agent.core.interface import GoTo, Return
 from agent.core.mission_view import MissionView, Peers
 from swarm.allocation.problem import rest_to_rest_s
 from swarm.model import UavId
+from swarm.protocol.calibration import FlightRates
 from swarm.protocol.fields import Point
-from swarm.protocol.messages import MissionConfig
+from swarm.protocol.messages import MissionConfig, UavSpec
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimPhase
@@ -221,7 +222,7 @@ class FleetAir:
         way_s = wish.takes_s
         if way_s is None:
             way_s = length_m(wish.corners_enu_m) / me.speed_m_s
-        return sortie_end_s + _OF_RESERVE * me.reserve_frac * me.endurance_s - way_s - climb_s
+        return sortie_end_s + _OF_RESERVE * self._reserve_s(me) - way_s - climb_s
 
     def can_fly(self, wish: Wish, path_enu_m: Sequence[Point], sortie_end_s: float) -> bool:
         """Whether its battery lasts for a way home that climbs into another layer first."""
@@ -236,8 +237,13 @@ class FleetAir:
                 np.array(upright_m), me.speed_m_s, me.acceleration_m_s2 or math.inf
             ).sum()
         )
-        more_s = (_MOST_OF_RESERVE - _OF_RESERVE) * me.reserve_frac * (me.endurance_s or 0.0)
+        more_s = (_MOST_OF_RESERVE - _OF_RESERVE) * self._reserve_s(me)
         return self._mission_s <= self.sets_off_by_s(wish, sortie_end_s, climb_s) + more_s
+
+    def _reserve_s(self, me: UavSpec) -> float:
+        """How long its reserve lasts [s], as fast as its battery has been found to drain."""
+        told = FlightRates.believed(self._replica.calibrations.get(self._uav), me)
+        return me.reserve_frac * (me.endurance_s or 0.0) / told.drain_frac
 
     def must_land(self, wish: Wish, sortie_end_s: float, retry_s: float) -> bool:
         """Whether it can't wait any longer for a way home, or out of a zone.

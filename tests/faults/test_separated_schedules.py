@@ -26,6 +26,7 @@ BROKEN_ONCE = {
     3010092: "an heir sat beside whom it followed, and was lost: two of three seats were",
     3100409: "a vehicle told an agent that heard nobody nothing of its battery, and fell",
     3100594: "who left a task for another layer still went by its own, and fell on the way",
+    3100598: "who waited for its way on a battery that drained fast took its reserve for longer",
     3100739: "who was held before it took off had let others have the air above its start",
     3010690: "an operator left whom only those had confirmed whose tokens had come up by then",
     3101968: "the mission was ended though one that was held near a task had just claimed it",
