@@ -60,15 +60,15 @@ def test_existing_file_wins_over_a_shipped_name(
         ),
         (
             "",
-            "SCENARIO: no such scenario file; give a file or a shipped scenario: hayfield, ",
+            "SCENARIO: no such scenario file; give a file or a shipped scenario: airstrip, ",
         ),
         (
             "a\nb",
-            r"'a\nb': no such scenario file; give a file or a shipped scenario: hayfield, ",
+            r"'a\nb': no such scenario file; give a file or a shipped scenario: airstrip, ",
         ),
         (
             "\0",
-            r"'\x00': no such scenario file; give a file or a shipped scenario: hayfield, ",
+            r"'\x00': no such scenario file; give a file or a shipped scenario: airstrip, ",
         ),
         ("x" * 5000, "x" * 5000 + ": no such scenario file; give a file or a shipped scenario: "),
     ],
