@@ -8,6 +8,7 @@ does not want waited for not at all. Who gets ready later joins the mission that
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -437,7 +438,7 @@ class MissionEndCondition:
         if TaskState.OPEN not in self._board.states.values() and not more_to_come:
             return ALL_ENDED, 0.0
         away_s = self._waits_s(taking_part, silent, mission_s, more_to_come=more_to_come)
-        return NOBODY_LEFT, away_s or self._may_claim_s(here)
+        return NOBODY_LEFT, away_s or self._may_claim_s(here, mission_s)
 
     def _waits_s(
         self, lost: set[UavId], silent: set[UavId], mission_s: float, *, more_to_come: bool
@@ -459,13 +460,19 @@ class MissionEndCondition:
         silent = {uav for uav in fleet if uav not in claims and uav not in given_up}
         return {uav for uav in silent if uav in members.present or members.missed(uav)}
 
-    def _may_claim_s(self, here: Collection[str]) -> float:
+    def _may_claim_s(self, here: Collection[str], mission_s: float) -> float:
         """How long the word of a claim may take that is not expected from what is known [s].
 
         In the field what a UAV can do depends on where it is, and who is in the air without a task
-        may be anywhere on a way that it has left.
+        may be anywhere on a way that it has left. It claims at once what it can do, and flies to a
+        base for what it can do then as late as its battery allows.
         """
-        claims = self._board.replica.claims
-        unknown = any(claims[uav].base is None for uav in here)
-        in_field = self._board.field_problem is not None
-        return 2.0 * self._timing.patience_s if in_field and unknown else 0.0
+        field = self._board.field_problem
+        if field is None or all(self._board.replica.claims[uav].base is not None for uav in here):
+            return 0.0
+        # Plain missions never load it.
+        from swarm.protocol.field_board import may_claim_until_s
+
+        until_s = may_claim_until_s(field, self._board, here, mission_s)
+        at_once_s = 2.0 * self._timing.patience_s
+        return max(at_once_s, until_s - mission_s) if math.isfinite(until_s) else at_once_s

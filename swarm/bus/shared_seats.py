@@ -247,6 +247,7 @@ class SharedSeats:
                 if how is None or seat is but:
                     continue
                 if how.gathered:
+                    seat.inbox.dropped += len(seat.waiting) == MOST_WAITING  # the oldest of them
                     seat.waiting.append((sample, how.latest))
                 else:
                     seat.inbox.offer(sample, how.latest)

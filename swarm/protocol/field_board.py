@@ -164,6 +164,35 @@ def doable_in_field(
     ]
 
 
+def may_claim_until_s(
+    problem: field.FieldProblem, board: TaskBoard, present: Collection[str], mission_s: float
+) -> float:
+    """By when all who hover have claimed what another battery lets them do [s mission time].
+
+    Who has left its way hovers nobody knows where: it may reach a base of which the place of its
+    last attempt tells nothing, and may fly there as late as its sortie allows.
+
+    Returns:
+        The latest end of a sortie of those that could do an open task from some base, full; minus
+        infinity if none could.
+    """
+    claims = _taking_part(board, present)
+    free = {uav for uav, claim in claims.items() if claim.task is None and claim.base is None}
+    hovers = [uav in free for uav in problem.uav_ids]
+    state = field_state(problem, board, {}, present=claims)
+    ends_s = state.sortie_end_s.copy()
+    state.active[:] = hovers
+    from swarm.kernels.field_alone import earliest_alone  # plain missions never load it
+
+    able = np.zeros(problem.n_uav, dtype=np.bool_)
+    for base in range(problem.n_base):
+        for row in np.flatnonzero(hovers).tolist():
+            _stand_at(problem, state, row, base, mission_s)
+        can = np.isfinite(earliest_alone(problem.kernel, state))
+        able |= np.any(can & state.open, axis=1)
+    return float(np.max(ends_s, where=able, initial=-math.inf))
+
+
 def _take_battery(
     problem: field.FieldProblem, state: field.FieldState, row: int, claim: Claim
 ) -> None:
@@ -180,11 +209,18 @@ def _take_battery(
 def _stand(problem: field.FieldProblem, state: field.FieldState, row: int, claim: Claim) -> None:
     """Let a UAV stand ready at the base of its claim, at its completion."""
     base = _base_of(problem, claim)
-    if base is None:
-        return
+    if base is not None:
+        _stand_at(problem, state, row, base, claim.completion_s)
+        state.arrives_s[row] = math.inf if claim.stage is BaseStage.PARKED else -math.inf
+
+
+def _stand_at(
+    problem: field.FieldProblem, state: field.FieldState, row: int, base: int, ready_s: float
+) -> None:
+    """Let a UAV stand on a slot of that base, ready then [s mission time]."""
     state.landed_at[row] = base
-    state.free_s[row] = claim.completion_s
-    state.arrives_s[row] = math.inf if claim.stage is BaseStage.PARKED else -math.inf
+    state.free_s[row] = ready_s
+    state.arrives_s[row] = -math.inf
     state.first_s[row] = problem.leg_s[problem.kind[row], problem.n_uav + base]
 
 

@@ -328,6 +328,25 @@ def test_who_hovers_nobody_knows_where_has_the_time_to_claim_what_it_can_do() ->
     assert coordinator.phase is MissionPhase.RUNNING
 
 
+@pytest.mark.parametrize(("left_m", "waits"), [(40.0, True), (900.0, False)])
+def test_who_hovers_nobody_knows_where_has_all_of_its_sortie_to_fly_to_a_base_for_what_is_left(
+    left_m: float, waits: bool
+) -> None:
+    """From its last task it could not reach that base any more; it may have left its next way."""
+    battery = replace(U0, endurance_s=100.0, reserve_frac=0.0)
+    base = Base(BaseId("b0"), (0.0, 0.0, 0.0), swap_s=30.0)
+    flown = replace(mission([battery], [task("t0", 45.0), task("t1", left_m)]), bases=(base,))
+    coordinator = LoneCoordinator(flown).started()
+    coordinator.hear("u0", replace(held("t0", 0.0, completion_s=60.0), sortie_end_s=75.0), 101.0)
+    coordinator.hear("u0", done("t0", 60.0), 160.0)
+    coordinator.hear("u0", replace(IDLE, sortie_end_s=75.0), 160.0)
+    coordinator.run_until(174.0)
+    assert (coordinator.phase is MissionPhase.RUNNING) == waits
+
+    coordinator.run_until(180.0)
+    assert coordinator.phase is MissionPhase.ENDED
+
+
 def test_a_mission_goes_on_as_long_as_a_uav_can_swap_for_what_is_left() -> None:
     battery = replace(U0, endurance_s=100.0, reserve_frac=0.0)
     base = Base(BaseId("b0"), (0.0, 0.0, 0.0), swap_s=30.0)
