@@ -143,12 +143,14 @@ class RequestHandler(ABC, Generic[Wish, Statement]):
     def _expected(self) -> set[str]:
         """Who is there and takes part, and so ought to know of what concerns everybody.
 
-        Who takes part and has not been seen may just not have shown its token yet.
+        A UAV that takes part and has not been seen may just not have shown its token yet. What
+        they know a coordinator learns from them.
         """
         claims = self._mission_state.replica.claims.items()
         out = {uav for uav, claim in claims if claim.phase is ClaimPhase.OUT}
-        taking_part = {*self._fleet} - out | {COORDINATOR}
-        return taking_part & self._mission_state.present if self.all_shown else taking_part
+        taking_part = {*self._fleet} - out
+        there = (taking_part | {COORDINATOR}) & self._mission_state.present
+        return there if self.all_shown else taking_part | there
 
     @property
     def _is_over(self) -> bool:

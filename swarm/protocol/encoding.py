@@ -96,7 +96,14 @@ _OF_TASKS: Final = frozenset(
     {"due_s", "opens_s", "closes_s", "path_enu_m", "height_m", "trigger_m"}
 )
 _OF_CLAIMS: Final = ("base", "stage", "arrives_s", "sortie_end_s", "reversed", "departs_s", "way")
-_OF_UAVS: Final = ("airspeed_m_s", "endurance_s", "reserve_frac", "charge_frac", "vehicle")
+_OF_UAVS: Final = (
+    "airspeed_m_s",
+    "endurance_s",
+    "reserve_frac",
+    "charge_frac",
+    "vehicle",
+    "landing_heading_rad",
+)
 _OF_BRIEFS: Final = (
     "bases",
     "zones",
