@@ -19,7 +19,7 @@ from swarm.model.ids import COORDINATOR
 from swarm.protocol.messages import Message, MissionPhase, PlanEpoch, Snapshot
 from swarm.protocol.operator_commands import abort_command
 from swarm.protocol.registers import Replica, snapshot_without, without_signers
-from swarm.protocol.sync import QuestionTimer
+from swarm.protocol.sync import MOST_OPEN, QuestionTimer
 from swarm.protocol.timing import stretch_of
 
 
@@ -81,18 +81,16 @@ class StateQuery:
         """Whether something may have happened that nobody has told yet: decide nothing."""
         self.ever = False
         """Whether any question has been answered, be it by nobody."""
-        self._asking = QuestionTimer(gap_s)
+        self._asking = QuestionTimer(gap_s, MOST_OPEN)
         self._every_s = every_s
         self._again_at_s = math.inf
-        self._open = 0
-        """Questions without an answer."""
         self._outdated = 0
-        """Those of them that were asked before the last doubt."""
+        """Questions without an answer that were asked before the last doubt."""
 
     def want(self, now_s: float, *, before_deciding: bool = False) -> None:
         """There is a reason to ask; ``before_deciding`` if what is known may be old."""
         if before_deciding:
-            self.unsure, self._outdated = True, self._open
+            self.unsure, self._outdated = True, self._asking.open
         self._asking.want(now_s)
 
     def due(self, now_s: float, present: int = 0) -> bool:
@@ -102,21 +100,21 @@ class StateQuery:
             self._asking.want(now_s)
         due = self._asking.due(now_s)
         if due:
-            self._open += 1
             self._again_at_s = now_s + self._every_s
         return due
 
     def answered(self) -> None:
         """A question has been answered by everyone who could."""
         self.ever = True
-        if self._open > self._outdated == 0:
+        if self._asking.open > self._outdated == 0:
             self.unsure = False
-        self._open, self._outdated = max(0, self._open - 1), max(0, self._outdated - 1)
+        self._asking.answered()
+        self._outdated = max(0, self._outdated - 1)
 
     def next_deadline_s(self) -> float | None:
         """When `due` will next be true."""
         wanted_s = self._asking.next_deadline_s()
-        if wanted_s is not None:
+        if wanted_s is not None or self._asking.is_full:
             return wanted_s
         return None if math.isinf(self._again_at_s) else self._again_at_s
 

@@ -53,7 +53,7 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
-from swarm.protocol.sync import QuestionTimer
+from swarm.protocol.sync import MOST_OPEN, QuestionTimer
 from swarm.protocol.timing import StallDetector, Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import AttemptResult, Choice, Claim, ClaimPhase, Outcome, Status
 
@@ -127,7 +127,7 @@ class MissionState:
         self._coordinator_missed = False
         self._missed: set[str] = set()
         self._stall_detector = StallDetector(timing.pause_s)
-        self._asking = QuestionTimer(timing.ask_gap_s)
+        self._asking = QuestionTimer(timing.ask_gap_s, MOST_OPEN)
         self._ask_at_s = 0.0
 
     def take_plan(self, plan: Plan) -> None:
@@ -159,6 +159,7 @@ class MissionState:
                 self.take_note(message, now_s)
                 ask |= self._names_unknown(message.body)
             case SnapshotsReceived(snapshots):
+                self._asking.answered()
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):
                 # What it said while one of us had no link has not come here.
@@ -228,7 +229,7 @@ class MissionState:
         return earliest(
             self._membership.next_deadline_s(),
             self._asking.next_deadline_s(),
-            self._ask_at_s if self.replica.brief is None else None,
+            self._ask_at_s if self.replica.brief is None and not self._asking.is_full else None,
         )
 
     def mission_s(self, now_s: float) -> float | None:

@@ -47,13 +47,26 @@ def some_of(
     return tuple(dict.fromkeys(asked))
 
 
-class QuestionTimer:
-    """Gathers wishes to ask into questions at least ``gap_s`` apart [s]."""
+MOST_OPEN: Final = 2
+"""Questions to everyone that may be open: one that may be outdated by now, and another."""
 
-    def __init__(self, gap_s: float) -> None:
+
+class QuestionTimer:
+    """Gathers wishes to ask into questions at least ``gap_s`` apart [s].
+
+    Args:
+        gap_s: that interval [s].
+        most_open: so many may wait for their answers, each of which `answered` tells; None: any
+            number. Where answers are read more slowly than questions come they would only grow.
+    """
+
+    def __init__(self, gap_s: float, most_open: int | None = None) -> None:
         self.stretch = 1.0
         """By what that interval grows, where everyone answers and there are many."""
         self._gap_s = gap_s
+        self._most_open = math.inf if most_open is None else most_open
+        self.open = 0
+        """Questions without an answer, where that counts."""
         self._free_at_s = -math.inf
         self._ask_at_s: float | None = None
 
@@ -64,15 +77,25 @@ class QuestionTimer:
 
     def due(self, now_s: float) -> bool:
         """Whether to ask now; True once for each question."""
-        if self._ask_at_s is None or now_s < self._ask_at_s:
+        if self._ask_at_s is None or now_s < self._ask_at_s or self.is_full:
             return False
         self._ask_at_s = None
+        self.open += 1
         self._free_at_s = now_s + self.stretch * self._gap_s
         return True
 
     def next_deadline_s(self) -> float | None:
-        """When `due` will next be true; None while there is nothing to ask."""
-        return self._ask_at_s
+        """When `due` will next be true; None while there is nothing to ask, or no room."""
+        return None if self.is_full else self._ask_at_s
+
+    @property
+    def is_full(self) -> bool:
+        """Whether as many questions as may wait for their answers."""
+        return self.open >= self._most_open
+
+    def answered(self) -> None:
+        """One has been answered by everyone who could."""
+        self.open = max(0, self.open - 1)
 
 
 MOST_WRITERS: Final = 10_000

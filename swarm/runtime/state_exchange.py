@@ -133,9 +133,12 @@ class StateExchange:
     ) -> tuple[Snapshot, ...]:
         """Whatever else than what has been ``learned`` those, or all, tell."""
         asked_s, asked_wall_s = self._clock.now_s(), self._loop.time()
-        # What is said in the own name is always told: by who remembers an earlier life, or a twin.
         known = {**self._known(), **digest_of(each.messages for each in learned)}
-        known.pop(self._name, None)
+        if self._name != COORDINATOR:
+            # What is said in the own name is told: by a twin, by who remembers an earlier life,
+            # and by all whom it has reached. Of the coordinator that is the whole board: told is
+            # what differs from that, as others of its name do.
+            known.pop(self._name, None)
         nonce = self._draw_nonce()
         question = encode_question(known, nonce, self._seal, whole=bool(of))
         expected = bond(None if self._seal is None else self._seal.name, nonce)

@@ -8,11 +8,13 @@ from coordinator.mission_view.mission_state import MissionState
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import (
+    Ask,
     CommonAction,
     CommonEvent,
     MessageReceived,
     PeerGone,
     PeerSeen,
+    SnapshotsReceived,
     Tick,
 )
 from swarm.protocol.messages import Body, Message
@@ -37,7 +39,10 @@ class Onlooker:
     def happen(self, fact: CommonEvent, mission_s: float | None = None) -> list[CommonAction]:
         if mission_s is not None:
             self.now_s = 200.0 + mission_s
-        return self.mission_state.step(fact, self.now_s)
+        wishes = self.mission_state.step(fact, self.now_s)
+        if Ask() in wishes:  # every question ends, be it without an answer
+            wishes += self.mission_state.step(SnapshotsReceived(()), self.now_s)
+        return wishes
 
     def statement(self, writer: str, body: Body) -> Message:
         self._counters[writer] += 1

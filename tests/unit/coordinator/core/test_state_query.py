@@ -41,3 +41,20 @@ def test_questions_without_doubt_hold_nothing_up() -> None:
     inquiry.answered()
 
     assert not inquiry.unsure
+
+
+def test_it_asks_no_third_time_before_the_first_answer_however_long_that_takes() -> None:
+    inquiry = StateQuery(GAP_S, every_s=1.0)
+    for at_s in (0.0, 1.0):
+        inquiry.want(at_s, before_deciding=True)
+        assert inquiry.due(at_s)
+    inquiry.want(2.0, before_deciding=True)
+    assert inquiry.next_deadline_s() is None
+    assert not inquiry.due(9.0)
+
+    inquiry.answered()
+    assert inquiry.due(9.0)
+    assert inquiry.unsure
+    inquiry.answered()
+    inquiry.answered()
+    assert not inquiry.unsure

@@ -11,7 +11,7 @@ from coordinator.dashboard.source import CommandState, Refusal, RefusedError
 from coordinator.operator.commands import CommandRequest
 from coordinator.operator.task_edits import NewTask, TaskWithdrawal
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.events import Ask, Finish, LinkChanged, LogLine, PeerSeen
+from swarm.protocol.events import Ask, Finish, LinkChanged, LogLine, PeerSeen, SnapshotsReceived
 from swarm.protocol.messages import CommandKind, MissionPhase, OperatorCommand, TaskEdit
 from swarm.protocol.uav_messages import StatusPhase
 from tests.support.builders import IDLE, MISSION, OUT, TIMING, brief, uav
@@ -36,7 +36,9 @@ def test_before_a_mission_is_known_nothing_can_be_said() -> None:
 
 def test_it_asks_until_somebody_knows_the_mission() -> None:
     play = DeskPlay()
-    play.wait(5.0)
+    for _ in range(10):
+        play.wait(0.5)
+        play.take(SnapshotsReceived(()))  # nobody knows it
 
     assert sum(isinstance(wish, Ask) for wish in play.wishes) >= 5
 

@@ -133,10 +133,13 @@ def test_who_hears_of_a_task_that_it_does_not_know_asks_for_it() -> None:
     state.start(0.0)
 
     def wishes(body: Body, counter: int, now_s: float, writer: str = COORDINATOR) -> list[object]:
-        fact = MessageReceived(message(writer, body, counter))
-        return list(state.step(fact, now_s))
+        said = list(state.step(MessageReceived(message(writer, body, counter)), now_s))
+        if said == [Ask()]:
+            state.step(SnapshotsReceived(()), now_s)
+        return said
 
     assert wishes(brief_of(flown), 1, 10.0) == []
+    state.step(SnapshotsReceived(()), 10.0)
     assert wishes(entries_of(flown)[0], 2, 10.0) == []
     assert wishes(epoch("u0"), 3, 10.0) == []
     assert wishes(epoch("u0", left_out={"energy": ("op1",)}), 4, 20.0) == [Ask()]

@@ -60,3 +60,19 @@ def test_a_question_for_later_holds_none_up_that_is_due_before() -> None:
     asking.want(10.0)
     assert asking.next_deadline_s() == 10.0
     assert asking.due(10.0)
+
+
+def test_no_more_are_open_than_may_be_and_the_next_waits_for_an_answer() -> None:
+    """Answers that are read more slowly than questions come would pile up for ever."""
+    asking = QuestionTimer(GAP_S, most_open=2)
+    for at_s in (10.0, 11.0):
+        asking.want(at_s)
+        assert asking.due(at_s)
+    asking.want(12.0)
+    assert asking.is_full
+    assert asking.next_deadline_s() is None
+    assert not asking.due(20.0)
+
+    asking.answered()
+    assert asking.next_deadline_s() == 12.0
+    assert asking.due(20.0)
