@@ -81,13 +81,16 @@ class Track:
 def drifting(pieces: Iterable[MotionPiece], before_m: Point, after_m: Point) -> list[MotionPiece]:
     """``pieces`` as flown by one that is ``before_m`` beside them first and ``after_m`` in the end.
 
-    The offset changes evenly from the beginning of the first to the end of the last.
+    The offset changes evenly from the beginning of the first to the end of the last; of a way so
+    short that no time passes for a clock it is that of its end.
     """
     flown = list(pieces)
     if not flown or (before_m == _AT_REST and after_m == _AT_REST):
         return flown
     begun_s = flown[0].begin_s
     duration_s = flown[-1].end_s - begun_s
+    if duration_s == 0.0:
+        return [replace(each, place_enu_m=plus(each.place_enu_m, after_m)) for each in flown]
     whole = minus(after_m, before_m)
     drift = (whole[0] / duration_s, whole[1] / duration_s, whole[2] / duration_s)
     return [

@@ -86,6 +86,14 @@ def test_a_drift_is_added_evenly_to_what_is_believed() -> None:
     assert true.position_enu_m(6.0) == (4.0, 3.0, 0.0)
 
 
+def test_a_way_that_takes_no_time_is_flown_where_it_ends() -> None:
+    """As one of a nanometre in a mission's tenth minute: the clock is the same after it."""
+    piece = MotionPiece(600.0, 600.0, (5.0, 0.0, 10.0), (1.0, 0.0, 0.0))
+    (true,) = drifting([piece], (0.0, 1.0, 0.0), (0.0, 3.0, 0.0))
+
+    assert true.position_enu_m(600.0) == (5.0, 3.0, 10.0)
+
+
 @pytest.mark.parametrize("change_m_s2", [None, 1.5])
 def test_pairs_that_are_far_from_each_other_all_the_time_change_nothing(
     change_m_s2: float | None,
