@@ -133,7 +133,7 @@ def test_who_hears_of_a_task_that_it_does_not_know_asks_for_it() -> None:
     state.start(0.0)
 
     def wishes(body: Body, counter: int, now_s: float, writer: str = COORDINATOR) -> list[object]:
-        said = list(state.step(MessageReceived(message(writer, body, counter)), now_s))
+        said: list[object] = [*state.step(MessageReceived(message(writer, body, counter)), now_s)]
         if said == [Ask()]:
             state.step(SnapshotsReceived(()), now_s)
         return said
