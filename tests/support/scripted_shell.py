@@ -93,13 +93,14 @@ async def at_work(
     capacity: int = 4096,
     together: Callable[[MessagesReceived], CommonEvent] | None = None,
     crowd: Callable[[Collection[str]], Sequence[str]] | None = None,
+    name: str = "u0",
 ) -> AsyncIterator[Played]:
-    """A shell that runs ``core`` on the seat of u0, seen from the seat of u1."""
+    """A shell that runs ``core`` on the seat of ``name``, seen from the seat of u1."""
     network = MemoryNetwork()
     other = network.join("u1")
-    seat = network.join("u0", inbox_capacity=capacity)
+    seat = network.join(name, inbox_capacity=capacity)
     join_mission(other, MISSION, "u1", status=True)
-    join_mission(seat, MISSION, "u0", status=True)
+    join_mission(seat, MISSION, name, status=True)
     clock, own = HandClock(), list[str]()
 
     def remember(action: Action) -> None:
@@ -111,7 +112,7 @@ async def at_work(
         seat,
         clock,
         mission=MISSION,
-        name="u0",
+        name=name,
         from_bus=as_event,
         execute=execute or remember,
         snapshot=(lambda _: snapshot) if answers else None,

@@ -152,12 +152,21 @@ def test_mission_time_in_an_answer_does_not_age_while_others_are_waited_for() ->
     play(scenario)
 
 
-def test_a_question_tells_what_the_core_knows_but_for_the_own_registers() -> None:
-    """Who answers in the own name is a twin, or remembers an earlier life: that must be heard."""
+@pytest.mark.parametrize(
+    ("name", "told"),
+    [("u0", {"u1": 2, COORDINATOR: 3}), (COORDINATOR, {"u0": 1, "u1": 2, COORDINATOR: 3})],
+)
+def test_a_question_tells_what_the_core_knows_but_for_the_own_registers(
+    name: str, told: dict[str, int]
+) -> None:
+    """Who answers in the own name is a twin, or remembers an earlier life: that must be heard.
+
+    The coordinator's are the whole board, and only what differs from that is told.
+    """
 
     async def scenario() -> None:
         core = ScriptedCore(first=[Ask()])
-        async with at_work(core, known={"u0": 1, "u1": 2, COORDINATOR: 3}) as played:
+        async with at_work(core, name=name, known={"u0": 1, "u1": 2, COORDINATOR: 3}) as played:
             queries: list[Query] = []
 
             def asked() -> bool:
@@ -166,7 +175,7 @@ def test_a_question_tells_what_the_core_knows_but_for_the_own_registers() -> Non
                 return bool(queries)
 
             await until(asked, "being asked")
-            assert decode_digest(queries[0].payload) == {"u1": 2, COORDINATOR: 3}
+            assert decode_digest(queries[0].payload) == told
 
     play(scenario)
 
