@@ -21,8 +21,21 @@ _SLOW_M_S = 1.0
 _ORIGIN = Origin(46.8, 9.7, 1100.0)
 
 
-def survey_mission(n_uav: int, n_task: int, seed: int, service_s: float = 2.0) -> Mission:
-    """UAVs in a row beside a square of tasks, as dense for every size of fleet."""
+BAND_M = 30.0, 110.0
+"""Heights between which fleets that keep a separation fly in benchmarks [m]."""
+
+
+def survey_mission(
+    n_uav: int,
+    n_task: int,
+    seed: int,
+    service_s: float = 2.0,
+    separation_m: float | None = None,
+) -> Mission:
+    """UAVs in a row beside a square of tasks, as dense for every size of fleet.
+
+    With ``separation_m`` [m] they share the layers of `BAND_M`, without it each has its own.
+    """
     rng = np.random.default_rng(seed)
     places_m = rng.uniform(0.0, 40.0 * n_task**0.5, (n_task, 2)).tolist()
     return Mission(
@@ -37,6 +50,8 @@ def survey_mission(n_uav: int, n_task: int, seed: int, service_s: float = 2.0) -
             for number, (east_m, north_m) in enumerate(places_m, 1)
         ),
         origin=_ORIGIN,
+        separation_m=separation_m,
+        band_m=None if separation_m is None else BAND_M,
     )
 
 

@@ -21,7 +21,7 @@ from rich.console import RenderableType
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.recording.recorder import RecordedCore
 from coordinator.recording.records import RecordableFact
-from sim.bench.fleets import options_for, survey_mission
+from sim.bench.fleets import BAND_M, options_for, survey_mission
 from sim.bench.machine import cpu_s, share_bytes, this_machine
 from sim.bench.results import BenchResult, Progress, quantile, unheard
 from sim.bench.turnaround import told_turnarounds
@@ -60,6 +60,8 @@ class ScaleSettings:
     link: LinkKind = LinkKind.NORMAL
     routers: int = 1
     agents_per_process: int = 1
+    separation_m: float | None = None
+    """What the fleet keeps apart, in layers that it shares [m]; None: each has its own layer."""
     seed: int = 0
 
 
@@ -90,6 +92,8 @@ class ScaleRun:
     """Agents that ended before they were told to."""
     load: float
     """Processes that wanted to run during the last minute of it."""
+    nearest_m: float | None = None
+    """The nearest that two in flight came to each other until then; None: never two were."""
 
     @property
     def agent_cpu_frac(self) -> float:
@@ -175,6 +179,7 @@ class ScaleBench(BenchResult):
                 Column("decisions"),
                 Column("claims each", ".1f", none="-"),
                 Column("heard besides", ".1f", "/s"),
+                Column("nearest", ".1f", "m", none="-"),
                 Column("lost"),
                 Column("load", ".1f"),
             ),
@@ -192,6 +197,7 @@ class ScaleBench(BenchResult):
                     len(run.latency_ms),
                     run.claims_per_decision,
                     run.besides_hz,
+                    run.nearest_m,
                     run.lost + run.ended,
                     run.load,
                 )
@@ -221,7 +227,7 @@ class ScaleBench(BenchResult):
             f"survey of {settings.tasks_per_uav} tasks for each UAV, {settings.method}, "
             f"{settings.routers} router(s), {settings.agents_per_process} agent(s) in a process, "
             f"{POSITION_RATE_HZ:g} position reports a second, "
-            f"watched for {settings.watch_s:g} s; seed {settings.seed}"
+            f"{self._apart()}, watched for {settings.watch_s:g} s; seed {settings.seed}"
         )
         for table in self.tables():
             yield from ("", table)
@@ -230,6 +236,11 @@ class ScaleBench(BenchResult):
             f"wanted: up within {START_TARGET_S:g} s, {SHARE_TARGET_BYTES / 1e6:g} MB an agent, "
             f"p99 below {LATENCY_TARGET_MS:g} ms, ratios of what is published 1"
         )
+
+    def _apart(self) -> str:
+        if (separation_m := self.settings.separation_m) is None:
+            return "a layer for each"
+        return f"{separation_m:g} m apart within {BAND_M[0]:g} to {BAND_M[1]:g} m"
 
     def as_markdown(self) -> str:
         """For a document."""
@@ -280,7 +291,12 @@ def measure_scale(settings: ScaleSettings, tell: Progress = unheard) -> ScaleBen
 
 
 async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
-    mission = survey_mission(n_uav, settings.tasks_per_uav * n_uav, settings.seed)
+    mission = survey_mission(
+        n_uav,
+        settings.tasks_per_uav * n_uav,
+        settings.seed,
+        separation_m=settings.separation_m,
+    )
     count, clock = MessageCount(), SystemClock()
     tell(f"{n_uav} UAVs: starting")
     begun_s = clock.now_s()
@@ -319,7 +335,7 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
             cpu_frac = {
                 kind: (seconds - used[kind]) / watched_s for kind, seconds in _used_s(run).items()
             }
-            lost, ended = len(state.lost), n_uav - len(shares)
+            lost, ended, near = len(state.lost), n_uav - len(shares), state.nearest
     return ScaleRun(
         uavs=n_uav,
         tasks=len(mission.tasks),
@@ -334,6 +350,7 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
         lost=lost,
         ended=ended,
         load=os.getloadavg()[0],
+        nearest_m=None if near is None else near.distance_m,
     )
 
 

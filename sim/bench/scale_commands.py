@@ -55,6 +55,17 @@ def scale(
         int,
         typer.Option("--agents-per-process", min=1, max=100, metavar="N", help="See swarm run."),
     ] = 1,
+    separation_m: Annotated[
+        float | None,
+        typer.Option(
+            "--separation-m",
+            min=1.0,
+            max=50.0,
+            metavar="M",
+            help="Keep them so far apart, in layers within 30 to 110 m; else each has its own.",
+            show_default=False,
+        ),
+    ] = None,
     seed: SeedOption = 0,
     json: JsonOption = False,
     plot: Annotated[
@@ -76,6 +87,7 @@ def scale(
         swarm bench scale
         swarm bench scale --sizes 10,50 --watch-s 10 --json
         swarm bench scale --sizes 10,100,200 --agents-per-process 25
+        swarm bench scale --sizes 10,100,200 --agents-per-process 25 --separation-m 6
         swarm bench scale --plot scale.svg --out scale.md
     """
     from sim.bench.plan_report import write_figure
@@ -93,6 +105,7 @@ def scale(
         link=link,
         routers=routers,
         agents_per_process=agents_per_process,
+        separation_m=separation_m,
         seed=seed,
     )
     _warn_of_large(settings)

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 from rich.console import RenderableType
 
+from sim.bench.fleets import BAND_M
 from sim.bench.machine import this_machine
 from sim.bench.results import BenchResult, Progress, table_of, unheard
 from sim.faults.case import quick_plan
@@ -24,7 +25,6 @@ from swarm.runtime.table import Column
 
 SIDE_M = 1000.0
 TASKS_PER_UAV = 5
-BAND_M = 30.0, 110.0
 _ERRORS = 6.0
 """Standard deviations of its position by which a pair may be nearer: three of either."""
 

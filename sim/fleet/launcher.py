@@ -117,11 +117,12 @@ class Launcher:
             case RunningVehicles(places):
                 vehicles = _there(places)
         await self._start(COORDINATOR, layout.coordinator())
-        # Whoever comes later in a mission flies higher, and climbs for longer before it starts.
-        for group in reversed(agent_groups([place async for place in vehicles], self.options)):
+        there = {place.uav: place async for place in vehicles}
+        places = [there[uav.id] for uav in self.mission.uavs if uav.id in there]
+        for group in agent_groups(places, self.options):
             await self._pace.room()
             uavs = [place.uav for place in group]
-            name = uavs[0] if len(uavs) == 1 else f"agents of {uavs[0]} to {uavs[-1]}"
+            name = uavs[0] if len(uavs) == 1 else f"agents of {uavs[0]} and {len(uavs) - 1} others"
             child = await self._start(name, layout.agents(group))
             self._current.update(dict.fromkeys(uavs, child))
             self._pace.started(child, len(group))

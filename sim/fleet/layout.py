@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
+from typing import TypeVar
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from swarm.model.layers import HIGHEST_M, FlightLayers, layers_below, layers_ove
 from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind, LinkPreset, Timing, preset
 from swarm.runtime.log import LogFormat
 
+_Member = TypeVar("_Member")
 AUTO_MESH_LIMIT = 16
 """Largest fleet for which peers link up directly by default (README of swarm.bus)."""
 OWN_AUTOPILOT_LIMIT = 20
@@ -402,22 +404,30 @@ def defaults_for(autopilots: Autopilots, n_uav: int) -> RunDefaults:
 
 
 def autopilot_groups(uavs: Sequence[str]) -> list[list[str]]:
-    """UAVs whose simulated autopilots share a process."""
+    """UAVs whose simulated autopilots share a process, as their agents may."""
     size = 1 if len(uavs) <= OWN_AUTOPILOT_LIMIT else VEHICLES_PER_PROCESS
-    return [list(uavs[first : first + size]) for first in range(0, len(uavs), size)]
+    return _in_turn(uavs, size)
 
 
 def agent_groups(
     places: Sequence[VehiclePlace], options: LaunchOptions
 ) -> list[list[VehiclePlace]]:
-    """UAVs whose agents share a process: neighbours in the mission that are told the same."""
-    groups: list[list[VehiclePlace]] = []
-    told_before: list[str] = []
-    for place in places:
-        told = options.passthrough.to_agent(place.uav)
-        if groups and told == told_before and len(groups[-1]) < options.agents_per_process:
-            groups[-1].append(place)
-        else:
-            groups.append([place])
-        told_before = told
-    return groups
+    """UAVs whose agents share a process, of those that are told the same, as they are to start.
+
+    Whoever comes later in a mission flies higher, and climbs for longer. So the last start first,
+    in all processes: agents of one begin one after the other.
+    """
+    rank = {place.uav: number for number, place in enumerate(places)}
+    alike: dict[tuple[str, ...], list[VehiclePlace]] = {}
+    for place in reversed(places):
+        alike.setdefault(tuple(options.passthrough.to_agent(place.uav)), []).append(place)
+    groups = [
+        group for same in alike.values() for group in _in_turn(same, options.agents_per_process)
+    ]
+    return sorted(groups, key=lambda group: -rank[group[0].uav])
+
+
+def _in_turn(members: Sequence[_Member], size: int) -> list[list[_Member]]:
+    """As few groups as hold them by ``size``, joined in turn, so that none has the last alone."""
+    count = -(-len(members) // size)
+    return [list(members[first::count]) for first in range(count)]

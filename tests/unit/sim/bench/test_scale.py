@@ -15,6 +15,7 @@ from rich.console import Console
 from agent.links.mavlink_vehicle import TURNAROUNDS
 from coordinator.mission_view.mission_state import MissionState
 from sim.bench import scale
+from sim.bench.fleets import survey_mission
 from sim.bench.machine import share_bytes, this_machine
 from sim.bench.plan_report import write_figure
 from sim.bench.scale import (
@@ -142,3 +143,14 @@ def test_a_fleet_too_large_for_the_machine_is_told_so_first(
     assert main(["bench", "scale", "--sizes", "2,500"]) == 0
     assert told[0].startswith("warning: 500 UAVs, and 1 core can fly about ")
     assert told[0].count("\n") == 1
+
+
+def test_a_fleet_that_keeps_apart_shares_the_layers_of_a_band() -> None:
+    apart = replace(BENCH, settings=replace(BENCH.settings, separation_m=6.0))
+    told = " ".join(str(part) for part in apart.parts())
+
+    assert "6 m apart within 30 to 110 m" in told
+    assert "a layer for each" in " ".join(str(part) for part in BENCH.parts())
+    kept = survey_mission(3, 6, 0, separation_m=6.0)
+    assert (kept.separation_m, kept.band_m) == (6.0, (30.0, 110.0))
+    assert replace(kept, separation_m=None, band_m=None) == survey_mission(3, 6, 0)
