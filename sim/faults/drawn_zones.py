@@ -6,7 +6,7 @@ They keep off starts and bases: who has no place to land any more can do nothing
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from coordinator.operator.zone_edits import NewZone
@@ -38,6 +38,20 @@ class DrawnZone:
             return 0.0
         heard_s = self.since_s if self.known_s is None else self.known_s.get(uav, math.inf)
         return heard_s + reaction_s
+
+
+def ordered_anew_s(known_s: float, refused_s: Sequence[float], reaction_s: float) -> float:
+    """Since when a UAV has had the time to order its way out of a zone [s].
+
+    Args:
+        known_s: since when it knows of the zone [s].
+        refused_s: when its vehicle would not fly a way, in order [s].
+        reaction_s: how long an order may take; one that the vehicle refuses is followed by another.
+    """
+    for at_s in refused_s:
+        if known_s <= at_s <= known_s + reaction_s:
+            known_s = at_s
+    return known_s
 
 
 def zone_over(world: World, uav: str, size_frac: float, name: str) -> NewZone | None:

@@ -54,6 +54,10 @@ class VehicleFlaw:
     """Multiple of the charge that a second in the air should take."""
 
 
+REACTION_S = 5.0
+"""Until when who hears of a zone has ordered its way out [s]."""
+
+
 @dataclass(frozen=True, slots=True)
 class FieldJudge:
     """Judges one world that is over.
@@ -67,13 +71,13 @@ class FieldJudge:
     Whoever hears of a zone that it is in orders its way out in the step in which it hears of it,
     or, if it has to ask others first what it has missed, when they have answered: at the latest
     ``reaction_s`` later. Then its vehicle stops, and flies the shortest way out from rest; see
-    `_leaves_s` for how long that takes.
+    `_leaves_s` for how long that takes. A vehicle that refuses that way gives it as long again.
     """
 
     world: World
     time_s: float = 1e-5
     """What is forgiven of windows: agents' clocks are not the world's [s]."""
-    reaction_s: float = 5.0
+    reaction_s: float = REACTION_S
     """Until when everybody has heard of a zone, and ordered its way out [s]."""
     stale_s: float = 0.0
     """How old what an agent knows of its vehicle's place may be [s]."""

@@ -33,7 +33,7 @@ from __future__ import annotations
 
 import itertools
 import traceback
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
 
@@ -43,8 +43,8 @@ from coordinator.core.active import CoordinatorCore
 from coordinator.core.standby import StandbyCore
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.planner.field_plan import is_field
-from sim.faults.drawn_zones import DrawnZone
-from sim.faults.field_judge import Chances, FieldJudge
+from sim.faults.drawn_zones import DrawnZone, ordered_anew_s
+from sim.faults.field_judge import REACTION_S, Chances, FieldJudge
 from sim.faults.injector import FaultInjector
 from sim.faults.message_log import MessageLog, Violation
 from sim.faults.shut_air import ShutAir
@@ -92,6 +92,8 @@ class InvariantChecker:
         self.message_log = MessageLog()
         self._lives: dict[Process, int] = {}
         self._changed_s: dict[str, float] = {}
+        self._refused_s: dict[str, list[float]] = defaultdict(list)
+        """By UAV: when its vehicle would not obey [s]."""
         self._used_up: set[str] = set()
         """UAVs whose battery was used up while the operator held them."""
         self._steps = 0
@@ -163,6 +165,7 @@ class InvariantChecker:
 
     def refused(self, process: Process, order: GoTo) -> None:
         """The vehicle of ``process`` will not obey."""
+        self._refused_s[process.name].append(self._now_s)
         if order.task is not None:
             self.message_log.refused(process.name, order.task)
 
@@ -383,7 +386,11 @@ class InvariantChecker:
         zones = [DrawnZone(zone) for zone in self._world.mission.zones]
         for drawn in self._injector.drawn:
             known_s = self._zone_known_s.get(drawn.zone.id, {})
-            heed = {uav: s for uav, s in known_s.items() if uav not in self._injector.left_alone}
+            heed = {
+                uav: ordered_anew_s(s, self._refused_s[uav], REACTION_S)
+                for uav, s in known_s.items()
+                if uav not in self._injector.left_alone
+            }
             zones.append(replace(drawn, known_s=heed))
         flaws = self._injector.flaws
         known = {"stale_s": TELEMETRY_S, "astray_m": self._astray_m}
