@@ -14,8 +14,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-
-import numpy as np
+from functools import partial
 
 from agent.core.fleet_air import GIVES_UP_S, FleetAir, Wish
 from agent.core.interface import (
@@ -37,19 +36,21 @@ from agent.core.interface import (
     VehicleOrder,
     VehicleReady,
 )
+from agent.core.kept_air import KeptAir
 from agent.core.mission_view import MissionView, Peers
+from agent.core.place_on_way import PlaceOnWay
 from swarm.protocol.events import LogLine
 from swarm.protocol.fields import Point
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimedWay, ClaimPhase
-from swarm.separation.shared_air import SharedAir, adds_nothing, strength
-from swarm.separation.shifted import hovering, landed, left_of_way, lifted, nominal, shifted_path
-from swarm.separation.slabs import apart
-from swarm.separation.straight_pieces import not_flown
+from swarm.separation.shared_air import SharedAir, adds_nothing
+from swarm.separation.shifted import hovering, landed, left_of_way, lifted, nominal
 
 STOP_LEG = 0
 """Of orders that are this module's own; those of the core are numbered from 1."""
+_BY_GRANT = GoTo | Return | Prepare
+"""Orders that may have to wait for a way."""
 _ASIDE_PATIENCE = 4.0
 """How long it waits for its way aside, in intervals at which it asks anew."""
 
@@ -93,13 +94,7 @@ class Airway:
         self._wish: Wish | None = None
         self._aside: Wish | None = None
         """It makes room, before its wish is asked again."""
-        self._granted: dict[str, int] = {}
-        self._keeps: tuple[int, ...] = ()
-        """Seats that it has taken over."""
-        self._sits = True
-        self._whole: ClaimedWay | None = None
-        """What it says of its way, with what it grants."""
-        self._made_of: tuple[object, ...] = ()
+        self._kept = KeptAir(uav)
         self._stands_at: tuple[str, BaseStage] | None = None
         """Where it stands until its way up is granted."""
         self._lifts_enu_m: Point | None = None
@@ -114,7 +109,11 @@ class Airway:
         """Whether somebody may still have to be let by."""
         self._room_at_s = -math.inf
         """Not before does it look again whether it is in anybody's way."""
-        self._place: Point | None = None
+        self._vehicle = PlaceOnWay()
+        self._rises = False
+        """Whether it asks for air to take off into, or has got it, and is not up there yet."""
+        self._unplaced: Callable[[], None] | None = None
+        """Gives an order anew that waits until the vehicle has told where it flies."""
 
     # -- what the vehicle says -----------------------------------------------------------------
 
@@ -125,11 +124,12 @@ class Airway:
             return event
         match event:
             case Telemetry(position_enu_m=place):
-                self._place, nominal_enu_m = place, self._nominal(place)
+                self._vehicle.tell(place)
+                nominal_enu_m = self._nominal(place)
                 self._mission_view.raised_m = place[2] - nominal_enu_m[2]
                 return replace(event, position_enu_m=nominal_enu_m)
             case VehicleReady():
-                self._aloft = True
+                self._aloft, self._rises = True, False
                 self._way = lifted(self._told_way, self._fleet.hovers_first_enu_m)
             case MotorsRun(ours=True) if self._told_way.flies:
                 self._way = replace(self._told_way, grounded=False)  # it may have left the ground
@@ -140,6 +140,7 @@ class Airway:
             case Landed() | Home():
                 self._aloft = self._moves = self._stops = False
                 self._lifts_enu_m = None
+                self._vehicle.land()
                 heir = self._fleet.heir(air) if isinstance(event, Home) else None
                 self._way = replace(landed(self._told_way), heir=heir)
             case Refused(order=GoTo(leg=leg)) if leg == self._flown_leg:
@@ -153,8 +154,8 @@ class Airway:
         vehicle is somewhere on that way, and stops there before anything else is asked for.
         """
         if self._way is None and claim.way is not None:
-            self._way, self._granted = claim.way, dict(claim.way.grants)
-            self._keeps = claim.way.keeps
+            self._way = claim.way
+            self._kept.recall(claim.way)
             self._aloft = bool(claim.way.path_enu_m) and not claim.way.grounded
             self._moves = bool(claim.way.path_enu_m)
 
@@ -177,19 +178,32 @@ class Airway:
             takes_s: how long its way takes, as reckoned [s]; None: by its length.
         """
         claimed = self._replica.claims.get(self._uav) is not None
-        if self._shared is None or not claimed or not isinstance(order, GoTo | Return):
+        way, self._unplaced = self._told_way, None
+        self._rises = isinstance(order, Prepare) and not (self._aloft or way.flies)
+        passes = isinstance(order, Prepare) and not self._rises
+        if self._shared is None or not claimed or passes or not isinstance(order, _BY_GRANT):
             self._actions.append(OrderVehicle(order))
             if isinstance(order, Hold | Prepare) and self._shared is not None:
                 self._stops = False
                 self._drop_wish()
             return
-        here, returns = self._here(), isinstance(order, Return)
-        if isinstance(order, Return) and self._comes_down and self._aloft:
-            order, here = replace(order, path_enu_m=(), via_enu_m=self._place, land=True), None
-        if here is None or (returns and not self._aloft):
+        here = self._fleet.rises_at_enu_m if self._rises else self._here()
+        if isinstance(order, Return) and self._aloft and self._comes_down:
+            order = replace(order, path_enu_m=(), via_enu_m=self._vehicle.enu_m, land=True)
+            here = None
+        elif isinstance(order, Return) and not self._aloft:
+            if way.flies and order.via_enu_m is not None:  # on its way up it has no other air
+                order = replace(order, path_enu_m=(), via_enu_m=way.path_enu_m[-1])
+            here = None
+        elif here is None and self._aloft and self._awaits_place():
+            again = partial(self.order, own_height=own_height, fixed=fixed, takes_s=takes_s)
+            self._unplaced = partial(again, order)
+            return
+        if here is None:
             self._actions.append(OrderVehicle(order))
             self._drop_wish()
             return
+        fixed |= self._rises
         corners = self._fleet.corners(order, here)
         # Home, a vehicle goes down to its own layer above its start by itself.
         own_height |= isinstance(order, Return) and not order.land
@@ -197,18 +211,24 @@ class Airway:
         wished = order, self._mission_view.now_s, corners, own_height, fixed, high, takes_s
         self._wish = Wish(*wished)
         self._aside = None
+        if self._rises:
+            self._actions.append(LogLine("asks for the air above its start", {}))
         if not self._aloft:
             self._stands_at = self._stands_at or self._fleet.standing()
         elif self._moves and not self._stops:
             left = None
-            if self._own_height == own_height and self._place is not None:
-                left = left_of_way(self._told_way, self._place, corners, self._wish.end_enu_m)
+            if self._own_height == own_height and self._vehicle.enu_m is not None:
+                flown = self._told_way, self._vehicle.enu_m
+                left = left_of_way(*flown, corners, self._wish.end_enu_m)
             if left is None:
                 self._stop()
             else:
                 self._way = left
                 self._depart(self._wish)
                 self._wish = None
+
+    def _awaits_place(self) -> bool:
+        return self._vehicle.is_awaited(self._mission_view.now_s, self._retry_s)
 
     def _drop_wish(self) -> None:
         """Nothing is asked for any more."""
@@ -227,14 +247,14 @@ class Airway:
         path = self._told_way.path_enu_m
         if not self._moves and path:
             return self._nominal(path[-1] if self._told_way.flies else path[0])
-        return None if self._place is None else self._nominal(self._place)
+        return None if self._vehicle.enu_m is None else self._nominal(self._vehicle.enu_m)
 
     def _stop(self) -> None:
         """Stop where the vehicle was told to be last, which is on its way."""
-        if self._place is None:
+        if self._vehicle.enu_m is None:
             return
-        self._stops, self._flown_leg, self._stop_enu_m = True, STOP_LEG, self._place
-        self._actions.append(OrderVehicle(GoTo(STOP_LEG, self._place)))
+        self._stops, self._flown_leg, self._stop_enu_m = True, STOP_LEG, self._vehicle.enu_m
+        self._actions.append(OrderVehicle(GoTo(STOP_LEG, self._vehicle.enu_m)))
 
     def _arrive(self, way: ClaimedWay) -> None:
         self._moves = False
@@ -256,13 +276,10 @@ class Airway:
         if self._stands_at is not None and claim.base is None:
             claim = self._fleet.still_standing(claim, *self._stands_at)
         way = self._told_way
-        if claim.phase is ClaimPhase.OUT and way.grounded:
+        if claim.phase is ClaimPhase.OUT and way.grounded and not self._rises:
             way = landed(way)  # it will not take off any more
-        made_of = way, self._granted, self._keeps
-        if made_of != self._made_of:  # most words are about something else
-            self._made_of = made_of
-            self._whole = replace(made_of[0], grants=dict(self._granted), keeps=self._keeps)
-        return claim if claim.way is self._whole else replace(claim, way=self._whole)
+        whole = self._kept.told(way)
+        return claim if claim.way is whole else replace(claim, way=whole)
 
     def settle(self, now_s: float) -> Sequence[Refused | ReturnAdvised]:
         """What follows from the claims: whom to grant, where to go, and what is told of it.
@@ -273,19 +290,18 @@ class Airway:
         air, claim = self._shared, self._replica.claims.get(self._uav)
         if air is None or claim is None or not self._has_changed(now_s):
             return []
+        if self._unplaced is not None and not self._awaits_place():
+            self._unplaced()
         self._fleet.note_losses()
         given_up = self._press(air, now_s)
-        others = self._fleet.heard(), self._fleet.expired()
-        self._keeps = air.inherited(self._uav, self._claims(), *others)
-        self._granted = air.granted(self._uav, self._claims(), *others)
-        self._sits = bool(air.stacks_of(self._uav, self._claims(), others[1]))
+        self._kept.look(air, self._claims, self._fleet.heard(), self._fleet.expired())
         self._depart_if_granted(air, now_s)
         return given_up
 
     def concerned(self, writer: str, said: Claim) -> bool:
         """Whether `settle` has something to do once ``writer`` has said so."""
         air = self._shared
-        if air is None or self._sits or self._granted or self._stops or self._aside is not None:
+        if air is None or self._kept.any or self._stops or self._aside is not None:
             return air is not None
         return air.concerns(self._uav, writer, said, self._replica.claims)
 
@@ -293,7 +309,8 @@ class Airway:
         """Whether anything is new since the last look: most steps are about something else."""
         due_s = self.next_deadline_s()
         told = (self._way, self._wish, self._aside, self._stops, self._moves, self._aloft)
-        now = (*self._replica.claims.values(), *told, len(self._fleet.heard()))
+        placed = self._vehicle.enu_m is not None
+        now = (*self._replica.claims.values(), *told, placed, len(self._fleet.heard()))
         before, self._settled = self._settled, now
         return now != before or (due_s is not None and due_s <= now_s)
 
@@ -312,6 +329,8 @@ class Airway:
     def next_deadline_s(self) -> float | None:
         """When `settle` will next have something to do."""
         wish = self._aside or self._wish
+        if self._unplaced is not None:
+            return self._vehicle.awaited_since_s + self._retry_s
         if self._stops:
             return None
         again_s = self._room_at_s if self._looks_again else None
@@ -369,35 +388,14 @@ class Airway:
             self._ask(air, wish, again=rival is not None)
 
     def _ask(self, air: SharedAir, wish: Wish, *, again: bool) -> None:
-        """Ask for the nearest layer in which nobody is in the way, else for one to wait for.
-
-        Of those it takes one through few slabs, where it needs few grants and keeps few from going.
-        """
-        claims, expired, here = self._claims(), self._fleet.expired(), hovering(self._told_way)
-        fallback: tuple[int, ClaimedWay] | None = None
-        for shift_m, corners in self._fleet.ways(
-            air, wish, here.shift_m, aside=wish is self._aside
-        ):
-            start = here.path_enu_m[0] if here.path_enu_m else corners[0]
-            path = shifted_path(start, corners, shift_m, wish.end_enu_m)
-            if self._aloft and not self._fleet.can_fly(wish, path, self.sortie_end_s()):
-                continue
-            array = np.array(path)
-            grounded = not self._aloft
-            reaches = self._fleet.reaches
-            if not air.can_grant(array, claims, expired, reaches, grounded=grounded):
-                continue
-            asked = ClaimedWay(self._number(), path, False, grounded, shift_m)
-            if air.is_free(self._uav, array, claims, expired, grounded=grounded):
-                self._request(wish, asked, again=again)
-                return
-            slabs = len(air.slabs.asked(array, grounded=grounded))
-            if fallback is None or slabs < fallback[0]:
-                fallback = slabs, asked
-        if wish is self._aside:
+        """Ask for the nearest layer in which nobody is in the way, else for one to wait for."""
+        here, aside = hovering(self._told_way), wish is self._aside
+        end_s = self.sortie_end_s() if self._aloft else None
+        found = self._fleet.way(air, wish, here, self._claims(), self._number(), end_s, aside=aside)
+        if found is not None and (found.is_free or ((again or not wish.asked) and not aside)):
+            self._request(wish, found.way, again=again)
+        elif aside:
             self._aside = None
-        elif fallback is not None and (again or not wish.asked):
-            self._request(wish, fallback[1], again=again)
 
     def _request(self, wish: Wish, asked: ClaimedWay, *, again: bool) -> None:
         """Ask for that, unless it is asked for already, and nobody is to be let in before."""
@@ -415,30 +413,24 @@ class Airway:
         works = self._wish is None and claims[self._uav].phase is not ClaimPhase.IDLE
         if self._moves or not self._aloft or not here.path_enu_m or works:
             return False
-        place, expired = np.array(here.path_enu_m), self._fleet.expired()
-        for uav in air.in_the_way(self._uav, place, claims, expired):
-            if self._wish is not None and strength(self._uav, claims) < strength(uav, claims):
-                continue
-            high, corner = self._at_own_height, self._nominal(here.path_enu_m[0])
-            if high:  # layers count from the ground, and not from the height of a task
-                corner = self._fleet.in_own_layer(corner)
-            self._aside = Wish(GoTo(STOP_LEG, corner), now_s, (corner,), out_of_layer=high)
-            return True
-        return False
+        if not self._fleet.is_in_the_way(air, here, claims, waits=self._wish is not None):
+            return False
+        high, corner = self._at_own_height, self._nominal(here.path_enu_m[0])
+        if high:  # layers count from the ground, and not from the height of a task
+            corner = self._fleet.in_own_layer(corner)
+        self._aside = Wish(GoTo(STOP_LEG, corner), now_s, (corner,), out_of_layer=high)
+        return True
 
     def _clear_behind(self, air: SharedAir) -> bool:
         """Give back what it has flown of its way, once somebody who asks needs no more than that.
 
         Gives whether anybody asks for any of the way.
         """
-        way, claims = self._told_way, self._claims()
-        path, place = way.path_enu_m, self._place
-        asking = air.in_the_way(self._uav, np.array(path), claims, self._fleet.expired())
-        left = path if place is None else not_flown(path, place)
-        wanted = (air.wanted(uav, air.way(uav, claims)) for uav in asking)
-        if any(apart(air.slabs, np.array(left), each) for each in wanted):
+        way, place = self._told_way, self._vehicle.enu_m
+        asked, left = self._fleet.left_for_others(air, way, place, self._claims())
+        if left is not None:
             self._way = replace(way, path_enu_m=left)
-        return bool(asking)
+        return asked
 
     # -- setting off ------------------------------------------------------------------------------
 
@@ -447,6 +439,8 @@ class Airway:
         if wish is None or not wish.asked or way.flies or self._stops:
             return
         if air.is_granted(self._uav, self._claims(), self._fleet.expired()):
+            if way.path_enu_m:
+                self._vehicle.set_off(way.path_enu_m[0], from_ground=not self._aloft)
             self._depart(wish)
             if now_s > wish.since_s and wish is not self._aside:
                 self.when_departed()
@@ -459,6 +453,10 @@ class Airway:
     def _depart(self, wish: Wish) -> None:
         """Send the vehicle along the way that is its own now."""
         way, order, path = self._told_way, wish.order, self._told_way.path_enu_m
+        if isinstance(order, Prepare):  # that it takes off is still to be seen
+            self._way = replace(way, flies=True)
+            self._actions.append(OrderVehicle(order))
+            return
         self._left_base |= self._stands_at is not None
         self._moves, self._aloft = len(path) > 1, True
         self._stands_at, self._lifts_enu_m, self._own_height = None, None, wish.own_height

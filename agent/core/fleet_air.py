@@ -12,7 +12,7 @@ from itertools import accumulate, pairwise
 
 import numpy as np
 
-from agent.core.interface import GoTo, Return
+from agent.core.interface import GoTo, Prepare, Return
 from agent.core.mission_view import MissionView, Peers
 from swarm.allocation.problem import rest_to_rest_s
 from swarm.model import UavId
@@ -21,11 +21,11 @@ from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig, UavSpec
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
-from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimPhase
+from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, air_of_brief, strength
-from swarm.separation.shifted import length_m
-from swarm.separation.slabs import POSITION_ERROR_M
-from swarm.separation.straight_pieces import thinned
+from swarm.separation.shifted import length_m, shifted_path
+from swarm.separation.slabs import POSITION_ERROR_M, apart
+from swarm.separation.straight_pieces import not_flown, thinned
 from swarm.separation.taken_ways import is_home
 
 ENDLESS_S = 1800.0
@@ -49,6 +49,8 @@ _LONGER_M = 0.5
 _ASIDE_M = (1.5, 3.0, 6.0, 12.0)
 """How far somebody steps aside, in separations."""
 _DIRECTIONS = 8
+_SPOT_M = 1.0
+"""Who stands no farther from its start, seen from above, stands there [m]."""
 _BESIDE_M = 0.1
 """Who is farther from a place, seen from above, is beside it."""
 
@@ -57,7 +59,7 @@ _BESIDE_M = 0.1
 class Wish:
     """An order that waits for its way."""
 
-    order: GoTo | Return
+    order: GoTo | Return | Prepare
     since_s: float
     corners_enu_m: tuple[Point, ...]
     """In the own layer, from where the UAV is to where the order ends [m]."""
@@ -95,6 +97,15 @@ class Wish:
         return length_m(path_enu_m) > length_m(self.corners_enu_m) + _LONGER_M
 
 
+@dataclass(frozen=True, slots=True)
+class FoundWay:
+    """A way that a UAV could ask for."""
+
+    way: ClaimedWay
+    is_free: bool
+    """Whether nobody is in its way, not even who only asks."""
+
+
 class FleetAir:
     """The air of the brief in force, in the eyes of the agent of ``uav``."""
 
@@ -123,10 +134,23 @@ class FleetAir:
         me = self._mission_view.me
         return () if me is None else (self._mission_view.in_layer(me.position_enu_m),)
 
-    def corners(self, order: GoTo | Return, here_enu_m: Point) -> tuple[Point, ...]:
+    @property
+    def rises_at_enu_m(self) -> Point | None:
+        """Where it comes first when it takes off anew [m]: above its start, or where it stands."""
+        me, telemetry = self._mission_view.me, self._mission_view.telemetry
+        if me is None:
+            return None
+        start_enu_m = self._mission_view.in_layer(me.position_enu_m)
+        if telemetry is None or math.dist(telemetry.position_enu_m[:2], start_enu_m[:2]) < _SPOT_M:
+            return start_enu_m
+        return *telemetry.position_enu_m[:2], start_enu_m[2]
+
+    def corners(self, order: GoTo | Return | Prepare, here_enu_m: Point) -> tuple[Point, ...]:
         """Of the way of ``order`` in the own layer, from there [m]."""
         me, corners = self._mission_view.me, [here_enu_m]
-        if isinstance(order, GoTo):
+        if isinstance(order, Prepare):
+            corners.append(order.position_enu_m)
+        elif isinstance(order, GoTo):
             corners += [*order.via_enu_m, order.position_enu_m]
         else:
             corners += [*order.path_enu_m, *([] if order.via_enu_m is None else [order.via_enu_m])]
@@ -175,6 +199,49 @@ class FleetAir:
                 there = east_m + away_m * math.cos(angle), north_m + away_m * math.sin(angle), up_m
                 if self._is_clear(wish.corners_enu_m[0], there):
                     yield from ((shift_m, (wish.corners_enu_m[0], there)) for shift_m in shifts_m)
+
+    def way(
+        self,
+        air: SharedAir,
+        wish: Wish,
+        here: ClaimedWay,
+        claims: Mapping[str, Claim],
+        number: int,
+        sortie_end_s: float | None,
+        *,
+        aside: bool,
+    ) -> FoundWay | None:
+        """The nearest layer in which nobody is in the way, else one to wait for; None: neither.
+
+        Of those it takes one through few slabs, where it needs few grants and keeps few from going.
+
+        Args:
+            air: in which.
+            wish: what is to be flown.
+            here: where the UAV hovers; no path of one that stands on the ground.
+            claims: of everyone, the own one as it is about to be said.
+            number: of the request.
+            sortie_end_s: by when it must have landed, its reserve kept [s mission time]; None for
+                one on the ground, which may wait.
+            aside: it is to make room, wherever that leads.
+        """
+        expired, grounded = self.expired(), sortie_end_s is None
+        fallback: tuple[int, ClaimedWay] | None = None
+        for shift_m, corners in self.ways(air, wish, here.shift_m, aside=aside):
+            start = here.path_enu_m[0] if here.path_enu_m else corners[0]
+            path = shifted_path(start, corners, shift_m, wish.end_enu_m)
+            if sortie_end_s is not None and not self.can_fly(wish, path, sortie_end_s):
+                continue
+            array = np.array(path)
+            if not air.can_grant(array, claims, expired, self.reaches, grounded=grounded):
+                continue
+            asked = ClaimedWay(number, path, False, grounded, shift_m)
+            if air.is_free(self._uav, array, claims, expired, grounded=grounded):
+                return FoundWay(asked, is_free=True)
+            slabs = len(air.slabs.asked(array, grounded=grounded))
+            if fallback is None or slabs < fallback[0]:
+                fallback = slabs, asked
+        return None if fallback is None else FoundWay(fallback[1], is_free=False)
 
     def in_own_layer(self, place_enu_m: Point) -> Point:
         """Above that place or below it, in the own layer [m]."""
@@ -344,6 +411,42 @@ class FleetAir:
             if strength(uav, claims) < own and asks not in wish.yielded:
                 return asks
         return None
+
+    def is_in_the_way(
+        self, air: SharedAir, here: ClaimedWay, claims: Mapping[str, Claim], *, waits: bool
+    ) -> bool:
+        """Whether somebody asks for where this UAV hovers; if it ``waits`` itself, with more right.
+
+        Args:
+            air: in which.
+            here: where it hovers.
+            claims: of everyone, the own one as it is about to be said.
+            waits: for a way of its own.
+        """
+        asking = air.in_the_way(self._uav, np.array(here.path_enu_m), claims, self.expired())
+        own = strength(self._uav, claims)
+        return any(not waits or own >= strength(uav, claims) for uav in asking)
+
+    def left_for_others(
+        self, air: SharedAir, way: ClaimedWay, place: Point | None, claims: Mapping[str, Claim]
+    ) -> tuple[bool, tuple[Point, ...] | None]:
+        """Whether anybody asks for any of the way that it flies, and what is left to be flown.
+
+        Args:
+            air: in which.
+            way: that it flies.
+            place: where it is [m]; None: it has not told.
+            claims: of everyone, the own one as it is about to be said.
+
+        Returns:
+            None as the second if nobody who asks needs no more than what it has flown of it.
+        """
+        path = way.path_enu_m
+        asking = air.in_the_way(self._uav, np.array(path), claims, self.expired())
+        left = path if place is None else not_flown(path, place)
+        wanted = (air.wanted(uav, air.way(uav, claims)) for uav in asking)
+        helps = any(apart(air.slabs, np.array(left), each) for each in wanted)
+        return bool(asking), left if helps else None
 
     def reaches(self, uav: str) -> bool:
         """Whether ``uav`` could hear a request."""

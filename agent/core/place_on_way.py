@@ -1,0 +1,52 @@
+"""Where one UAV's vehicle is on its way, as far as that is known.
+
+Words of a vehicle come a few times a second, and right after it was sent off the last one is of
+before: of the ground that it is about to leave, say. Leaves out: ways (agent.core.airway).
+"""
+
+from __future__ import annotations
+
+import math
+
+from swarm.protocol.fields import Point
+
+_UP_M = 2.0
+"""Who is no farther below where its way begins has risen to there [m]."""
+_BESIDE_M = 5.0
+"""Who climbs is no farther from there, seen from above [m]."""
+
+
+class PlaceOnWay:
+    """The place of one vehicle that may be sent off, and told to stop, between two words of it."""
+
+    def __init__(self) -> None:
+        self.enu_m: Point | None = None
+        """Where it is, or would be stopped [m; mission origin]; None: nobody knows."""
+        self.awaited_since_s = math.inf
+        """Since when an order has waited until that is known [s]."""
+        self._rises_to_enu_m: Point | None = None
+        """Where it comes first from the ground [m]; None: it is in the air, or was not sent off."""
+
+    def tell(self, place_enu_m: Point) -> None:
+        """The vehicle says that it is there, which counts once it is where its way begins."""
+        top_enu_m = self._rises_to_enu_m
+        if top_enu_m is not None:
+            below = place_enu_m[2] < top_enu_m[2] - _UP_M
+            if below and math.dist(place_enu_m[:2], top_enu_m[:2]) <= _BESIDE_M:
+                return
+        self.enu_m, self._rises_to_enu_m = place_enu_m, None
+
+    def set_off(self, begins_enu_m: Point, *, from_ground: bool) -> None:
+        """It is sent on a way that begins there, where it hovers, or above where it stands."""
+        self.enu_m, self._rises_to_enu_m = begins_enu_m, begins_enu_m if from_ground else None
+
+    def is_awaited(self, now_s: float, patience_s: float) -> bool:
+        """Whether an order has to wait, for so long at most, until it is known where it flies."""
+        if self.enu_m is not None:
+            return False
+        self.awaited_since_s = min(self.awaited_since_s, now_s)
+        return now_s < self.awaited_since_s + patience_s
+
+    def land(self) -> None:
+        """It is on the ground, wherever it said that it was last."""
+        self._rises_to_enu_m = None
