@@ -33,6 +33,7 @@ BROKEN_ONCE = {
     3102180: "the judge took somebody in another layer to fly to a task's height on a slant",
     3102337: "who began anew had not been told the time, and left its task for that",
     3102434: "who stopped where it hovered, and asked for its way home at once, took it as flown",
+    5002032: "who turned before its vehicle had said a word flew where nobody had granted it",
     3010313: "a line under a new zone was flown by one whose battery has no end",
 }
 
@@ -67,7 +68,8 @@ def test_a_larger_fleet_keeps_apart_too() -> None:
 
 def _check(seed: int) -> None:
     done = play(random_case(seed))
+    astray_m = done.case.astray_m
     asked_m, nearest = done.world.mission.separation_m, closest_approach(done.world.tracks)
     assert done.broken is None, f"{seed}: {done.broken}"
     assert asked_m is not None
-    assert nearest is None or nearest.distance_m >= asked_m - 1e-3, f"{seed}: {nearest}"
+    assert nearest is None or nearest.distance_m >= asked_m - astray_m - 1e-3, f"{seed}: {nearest}"
