@@ -18,7 +18,12 @@ from typing import Protocol, TypeVar
 
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.recording.growing_mcap import GrowingMcap, Patch
-from coordinator.recording.recorder import RecordedCore, Recorder, RecordingInfo
+from coordinator.recording.recorder import (
+    RecordedCore,
+    Recorder,
+    RecordingInfo,
+    new_mcap,
+)
 from coordinator.recording.records import RecordableFact
 from swarm.protocol.events import CommonEvent
 from swarm.runtime.clock import SystemClock, unix_s
@@ -256,10 +261,11 @@ class FlightRecorder:
         patient: bool = False,
     ) -> None:
         self.about = about
-        self._recorder = Recorder(about)
+        self._mcap = new_mcap(about)
+        self._recorder = Recorder(about, self._mcap)
         self._time_ns = time_ns
         self._thread = RecordingThread(
-            self._recorder.mcap,
+            self._mcap,
             sink,
             on_fault=on_fault,
             last=self._recorder.draw,
@@ -301,7 +307,7 @@ class FlightRecorder:
     @property
     def told(self) -> str:
         """How much has been written, in words."""
-        mcap = self._recorder.mcap
+        mcap = self._mcap
         size = mcap.size_bytes
         shown = f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
         lasted_s = 0.0 if self._begun_ns is None else (self._last_ns - self._begun_ns) / 1e9

@@ -1,8 +1,8 @@
 """What goes into a recording, and in which order: facts as they come, pictures in between.
 
 A recorder follows the mission by an observer of its own, fed with the very facts it writes down, so
-that what it draws is what a replay will show. Pure: bytes go to a `GrowingMcap`, times are passed
-in.
+that what it draws is what a replay will show. Pure: lines go to a `LineSink`, a file in the making
+or who looks on live, and times are passed in.
 """
 
 from __future__ import annotations
@@ -121,22 +121,39 @@ class RecordingInfo:
         }
 
 
-class Recorder:
-    """Turns facts into lines of a file."""
+class LineSink(Protocol):
+    """Takes lines, each with its topic and schema."""
 
-    def __init__(self, about: RecordingInfo) -> None:
-        self.mcap = GrowingMcap(f"peckorder {__version__}", about.metadata(), METADATA)
+    def define(self, schema: str, data: bytes) -> None:
+        """Publish a JSON schema under a name that is not taken."""
+        ...
+
+    def add(self, topic: str, schema: str, data: bytes, log_ns: int) -> None:
+        """One message of UTF-8 JSON, of a schema that is defined, as of that time [ns]."""
+        ...
+
+
+def new_mcap(about: RecordingInfo) -> GrowingMcap:
+    """A file in the making, with nothing in it but what it is ``about``."""
+    return GrowingMcap(f"peckorder {__version__}", about.metadata(), METADATA)
+
+
+class Recorder:
+    """Turns facts into lines."""
+
+    def __init__(self, about: RecordingInfo, sink: LineSink) -> None:
+        self._sink = sink
         for name in SCHEMAS:
-            self.mcap.define(name, schema_of(name))
+            sink.define(name, schema_of(name))
         for name, schema in (*FOXGLOVE_SCHEMAS.items(), *CURVE_SCHEMAS.items()):
-            self.mcap.define(name, schema)
+            sink.define(name, schema)
         self._mission = about.mission
         self._observer = MissionObserver(about.mission, about.timing, None)
         self._pictures = FoxgloveTopics()
         self._period_s = PICTURE_S * about.speedup
         self._picture_at_s = -math.inf
         self._last: tuple[float, int] | None = None
-        """Time of the newest fact, by both clocks."""
+        """Time of the newest fact or look, by both clocks."""
 
     def note(self, what: RecordableFact, now_s: float, time_ns: int) -> None:
         """Write down a fact or a plan; ``time_ns`` is by the wall's or the virtual clock [ns]."""
@@ -151,6 +168,10 @@ class Recorder:
         line = encode(what, self._mission, now_s, mission_state.mission_s(now_s))
         if line is not None:
             self._add(line, time_ns)
+        self.look(now_s, time_ns)
+
+    def look(self, now_s: float, time_ns: int) -> None:
+        """Show how everything stands at that time, if it is time for another picture."""
         self._last = now_s, time_ns
         if now_s >= self._picture_at_s:
             self._picture_at_s = now_s + self._period_s
@@ -168,7 +189,7 @@ class Recorder:
                 self._add(line, time_ns)
 
     def _add(self, line: FileMessage, time_ns: int) -> None:
-        self.mcap.add(line.topic, line.schema, line.data, time_ns)
+        self._sink.add(line.topic, line.schema, line.data, time_ns)
 
 
 class RecordingObserver:

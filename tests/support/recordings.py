@@ -10,7 +10,7 @@ from coordinator.mission_view.mission_state import MissionState
 from coordinator.planner.plan import make_plan
 from coordinator.recording.flight_recorder import virtual_ns
 from coordinator.recording.growing_mcap import Patch
-from coordinator.recording.recorder import RecordedCore, Recorder, RecordingInfo
+from coordinator.recording.recorder import RecordedCore, Recorder, RecordingInfo, new_mcap
 from coordinator.recording.records import RecordableFact
 from sim.world.network import IdealNetwork
 from sim.world.settings import ScheduledLosses, WorldSettings
@@ -48,7 +48,8 @@ class Steps:
         self.written: list[int] = []
         """How many facts each state of the disk holds."""
         self._every = every
-        self._recorder = Recorder(about)
+        self._mcap = new_mcap(about)
+        self._recorder = Recorder(about, self._mcap)
         self._grow(last=False)
 
     def note(self, what: RecordableFact, now_s: float) -> None:
@@ -63,7 +64,7 @@ class Steps:
         return bytes(self.disk.data)
 
     def _grow(self, *, last: bool) -> None:
-        patch = self._recorder.mcap.grow(last=last)
+        patch = self._mcap.grow(last=last)
         if patch is not None:
             self.disk.apply(patch)
             self.written.append(len(self.noted))

@@ -12,7 +12,7 @@ from coordinator.mission_view.story import EventKind
 from coordinator.recording.explanation import Explanation, explain_task, explain_uav
 from coordinator.recording.growing_mcap import Patch
 from coordinator.recording.reader import Recording, read_recording
-from coordinator.recording.recorder import Recorder, RecordingInfo
+from coordinator.recording.recorder import Recorder, RecordingInfo, new_mcap
 from coordinator.recording.records import RecordingStarted
 from swarm.model import Plan
 from swarm.model.ids import COORDINATOR, OPERATOR
@@ -47,7 +47,9 @@ class Tape:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        self._recorder = Recorder(RecordingInfo(MISSION, TIMING))
+        about = RecordingInfo(MISSION, TIMING)
+        self._mcap = new_mcap(about)
+        self._recorder = Recorder(about, self._mcap)
         self._counters: Counter[str] = Counter()
         self._recorder.note(RecordingStarted(), 0.0, 0)
         for name in (COORDINATOR, "u0", "u1"):
@@ -75,7 +77,7 @@ class Tape:
         self.happen(Tick(), mission_s + TIMING.loss_delay_s)
 
     def stop(self) -> Recording:
-        patch = self._recorder.mcap.grow(last=True)
+        patch = self._mcap.grow(last=True)
         assert isinstance(patch, Patch)
         self._path.write_bytes(patch.data)
         return read_recording(self._path)
