@@ -20,7 +20,9 @@ from swarm.protocol.events import CommonAction, CommonEvent, Tick
 from swarm.protocol.timing import LinkPreset
 from swarm.runtime.clock import Clock, incarnation
 from swarm.runtime.log import get_logger
-from swarm.runtime.shell import Shell
+from swarm.runtime.shell import Core, Shell
+
+ObservingCore = Core[CommonEvent, CommonAction]
 
 EFFECT_S = 10.0
 """Wall time in which an order shows its effect, or it has not been obeyed."""
@@ -33,6 +35,8 @@ class LiveMission:
         mission: its name; None for the only one there is, and after it for the next.
         open_bus: takes a seat on the bus, however long that takes.
         complete: see `MissionObserver`.
+        around: puts a core that looks on with it around the session of a mission.
+        name: of this process, in its log.
     """
 
     def __init__(
@@ -45,6 +49,8 @@ class LiveMission:
         *,
         may_order: bool = True,
         complete: bool = False,
+        around: Callable[[str, OperatorSession], ObservingCore] = lambda _, session: session,
+        name: str = "dashboard",
     ) -> None:
         self.speedup = speedup
         self.orders = self if may_order else None
@@ -62,7 +68,8 @@ class LiveMission:
         """What was ordered in earlier sessions."""
         self._dropped = Counter[str]()
         """What was dropped in earlier seats."""
-        self._log = get_logger("dashboard")
+        self._around = around
+        self._log = get_logger(name)
 
     async def run(self) -> None:
         """Look on until cancelled.
@@ -96,7 +103,7 @@ class LiveMission:
         )
         replica = self._operator_session.mission_state.replica
         self._shell = observer_shell(
-            self._operator_session,
+            self._around(mission, self._operator_session),
             bus,
             self._clock,
             mission,

@@ -40,6 +40,7 @@ LACKING = f"""
     ground  swarm replay           : replay nothing.mcap
     ground  swarm explain          : explain nothing.mcap --task t1
     ground  swarm record           : record new.mcap
+    ground  swarm foxglove         : foxglove --check
     ground  swarm simulate         : simulate --from nothing.mcap
     ground  --record               : simulate table-1 --record new.mcap
     ground  --record               : run table-1 --record new.mcap
