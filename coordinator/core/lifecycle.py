@@ -109,6 +109,7 @@ class StartDecision(Enum):
     WAIT = "the plan is not made, or somebody may yet get airborne"
     START = "everybody is airborne, held by the operator or given up, and planned for"
     NOBODY = "everybody is given up"
+    OVER = "the fleet was at work already, and nobody of it is there any more"
 
 
 class StartGate:
@@ -153,6 +154,8 @@ class StartGate:
         self.rates: Mapping[str, FlightRates] = {}
         """How UAVs fly by what the plan was made with."""
         self._request = 0
+        self._over_at_s: float | None = None
+        """When a fleet that was at work already, and of which nobody is there, has gone."""
 
     def begin(self, now_s: float) -> list[CoordinatorAction]:
         """The fleet is briefed: wait for it, and plan for all of it."""
@@ -188,7 +191,8 @@ class StartGate:
         self._wake_at_s = None
         if self.is_forestalled:
             self._start_by_s = None
-            return StartDecision.WAIT, []
+            return self._look_for_the_fleet(now_s), []
+        self._over_at_s = None
         if self._start_by_s is not None and self._start_by_s <= now_s:
             self._start_by_s = None
         uavs = self._fleet
@@ -228,6 +232,21 @@ class StartGate:
             return StartDecision.WAIT, []
         self._start_by_s = None
         return StartDecision.START, []
+
+    def _look_for_the_fleet(self, now_s: float) -> StartDecision:
+        """Whether to wait for word of the mission that runs: from whoever is there, or comes back.
+
+        Where every question of this process is lost, that word never comes.
+        """
+        if not self._membership.present.isdisjoint(self._fleet):
+            self._over_at_s = None
+            return StartDecision.WAIT
+        if self._over_at_s is None:
+            self._over_at_s = now_s + self._timing.abandon_s
+        if self._over_at_s <= now_s:
+            return StartDecision.OVER
+        self._wake_at_s = self._over_at_s
+        return StartDecision.WAIT
 
     def _look(self, uavs: Iterable[UavId], ready: Collection[UavId], now_s: float) -> None:
         """Take note of who hovers, and who is lost."""

@@ -61,7 +61,7 @@ TRANSITIONS: Final[Mapping[MissionStage, Mapping[MissionStage, str]]] = MappingP
         MissionStage.BRIEFED: {
             MissionStage.RUNNING: "everybody is airborne or given up, or the mission was on",
             MissionStage.ENDED: "nobody is airborne, there is no plan, or it was aborted",
-            MissionStage.LEFT: "another coordinator leads",
+            MissionStage.LEFT: "another coordinator leads, or led a fleet that is gone",
         },
         MissionStage.RUNNING: {
             MissionStage.RUNNING: "a coordinator that is gone has led it meanwhile",
@@ -267,6 +267,10 @@ class StagedMission:
         verdict, actions = self.gate.advance(now_s)
         if verdict is StartDecision.NOBODY:
             return [*actions, *self.end("no UAV is airborne", now_s)]
+        if verdict is StartDecision.OVER:
+            # Nothing is said: of who was only cut off the mission is another's.
+            why = "the fleet was at work already, and has gone without a word of its mission"
+            return [*actions, *self.leave("leaves the mission to others", why, now_s)]
         if verdict is StartDecision.WAIT:
             return actions
         actions += self._enter(MissionStage.RUNNING, now_s)

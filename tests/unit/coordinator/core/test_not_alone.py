@@ -12,6 +12,7 @@ from swarm.protocol.events import (
     Ask,
     LinkChanged,
     MessageReceived,
+    PeerGone,
     PeerSeen,
     Publish,
     SnapshotsReceived,
@@ -75,6 +76,56 @@ def test_a_fleet_at_work_is_a_reason_to_ask_and_never_to_start() -> None:
     coordinator.answers = [answer(registers(running(19.0)), 420.0)]
     coordinator.hear("u0", IDLE, 501.0)
     assert coordinator.phase is MissionPhase.RUNNING
+
+
+def at_work(coordinator: LoneCoordinator) -> LoneCoordinator:
+    """It hears a fleet at work, while every question of its own is lost."""
+    coordinator.answer_plan("u0", "u1")
+    coordinator.see("u0", "u1")
+    coordinator.hear("u0", held("t0", 0.0), 101.0)
+    coordinator.hear("u0", done("t0"), 102.0)
+    return coordinator
+
+
+def test_who_never_got_an_answer_leaves_when_the_fleet_has_been_gone_for_long() -> None:
+    coordinator = at_work(LoneCoordinator(FLOWN, incarnation=600))
+    coordinator.lose("u0", 200.0)
+    coordinator.run_until(1000.0)
+    assert finishes(coordinator.log) == []  # one is there, and may tell
+    coordinator.lose("u1", 1000.0)
+    gone_s = coordinator.now_s
+
+    coordinator.run_until(gone_s + 0.9 * TIMING.abandon_s)
+    assert finishes(coordinator.log) == []
+    coordinator.run_until(gone_s + TIMING.abandon_s)
+
+    assert finishes(coordinator.log) == [1]
+    assert coordinator.core.next_deadline_s() is None
+    # Who was only cut off flies on: nothing was said of an end.
+    assert said(coordinator.log, PlanEpoch) == []
+    assert notes(coordinator.log)[-1].text == "leaves the mission to others"
+
+
+def test_who_comes_back_in_time_is_waited_for_and_asked() -> None:
+    coordinator = at_work(LoneCoordinator(FLOWN, incarnation=600))
+    coordinator.lose("u0", 200.0)
+    coordinator.lose("u1", coordinator.now_s)
+    coordinator.run_until(coordinator.now_s + 0.9 * TIMING.abandon_s)
+
+    coordinator.answers = [answer(registers(running(19.0)), 20.0)]
+    coordinator.see("u0")
+    assert coordinator.phase is MissionPhase.RUNNING
+
+
+def test_who_has_no_link_itself_takes_nobody_for_gone() -> None:
+    coordinator = at_work(LoneCoordinator(FLOWN, incarnation=600))
+    coordinator.happen(LinkChanged(False), 200.0)
+    coordinator.happen(PeerGone("u0"))
+    coordinator.happen(PeerGone("u1"))
+
+    coordinator.run_until(200.0 + 10.0 * TIMING.abandon_s)
+
+    assert finishes(coordinator.log) == []
 
 
 def test_an_ended_mission_of_before_does_not_end_the_one_that_begins() -> None:
