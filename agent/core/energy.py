@@ -52,10 +52,15 @@ class SortieClock:
         if self._counted_s is None:
             self._counted_s = mission_s + _budget_s(me, me.charge_frac) / self._drain_frac
 
-    def recall(self, sortie_end_s: float | None) -> None:
-        """An earlier life of this agent said so; nothing of one that ended on the ground."""
+    def recall(self, sortie_end_s: float | None, drain_frac: float = 1.0) -> None:
+        """An earlier life of this agent said so; nothing of one that ended on the ground.
+
+        Args:
+            sortie_end_s: by when it must have landed [s mission time].
+            drain_frac: what it had told of its battery, and reckoned with.
+        """
         if sortie_end_s is not None:
-            self._counted_s = sortie_end_s
+            self._counted_s, self._drain_frac = sortie_end_s, drain_frac
 
     def depart(self, me: UavSpec, mission_s: float) -> None:
         """It takes off with a full battery."""

@@ -75,7 +75,7 @@ class FieldTasking(Tasking):
 
     def recall(self, claim: Claim) -> None:
         """An earlier life of this agent claimed so: what it says of the battery."""
-        self._sortie.recall(claim.sortie_end_s)
+        self._sortie.recall(claim.sortie_end_s, self._flights.meter.rates.drain_frac)
 
     def stand(self, now_s: float, *, found: bool = False) -> bool:
         """Whether it stands at a base, by its last claim or as it was found: stay there."""

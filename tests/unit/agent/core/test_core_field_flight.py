@@ -384,3 +384,23 @@ def test_a_resumed_line_is_flown_in_the_direction_claimed(script: Script) -> Non
     assert life.flight.position_enu_m == (100.0, 50.0, 10.0)
     assert life.claim == replace(claims(agent.log)[-1], phase=ClaimPhase.HELD)
     assert len([order for order in orders(life.log) if isinstance(order, GoTo)]) == 1
+
+
+def test_started_again_it_counts_a_battery_that_drains_faster_once(script: Script) -> None:
+    agent = flying(script)
+    for at_s in (0.0, 20.0, 40.0, 60.0):  # it drains 1.5 times as fast as planned
+        agent.be_at((at_s, 0.0, 10.0), 1.0 - 1.5 * at_s / ENDURANCE_S, at_s)
+    agent.run_until(60.0)
+    ends_s = agent.core._tasking._sortie.end_s
+    assert ends_s == pytest.approx(BUDGET_S / 1.5, abs=1.0)
+    agent.arrive(100.0)
+    script.items = ["t1"]
+    agent.post(entry("t1", 120.0))
+    agent.run_until(105.0)
+    assert agent.task == "t1"
+
+    life = agent.next_life()
+    life.be_at((101.0, 0.0, 10.0), None)
+    life.happen_ready()
+
+    assert life.core._tasking._sortie.end_s == pytest.approx(ends_s)

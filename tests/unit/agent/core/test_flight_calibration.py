@@ -88,6 +88,18 @@ def test_a_sortie_ends_by_how_fast_the_battery_drains() -> None:
     assert math.isclose(sortie.end_s, 170.0)
 
 
+def test_what_an_earlier_life_said_of_the_sortie_holds_its_drain_already() -> None:
+    before, later = SortieClock(), SortieClock()
+    before.heed(1.6, 0.0)
+    before.begin(ME, 0.0)
+    assert before.end_s == 50.0
+
+    later.recall(before.told_s, 1.6)
+    later.heed(1.6, 20.0)
+
+    assert later.end_s == 50.0
+
+
 def test_a_sortie_that_drains_as_planned_is_as_it_was() -> None:
     sortie, plain = SortieClock(), SortieClock()
     for each in (sortie, plain):

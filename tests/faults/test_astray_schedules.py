@@ -1,0 +1,18 @@
+"""Missions with positions that are off and losses all along, and everything that goes wrong."""
+
+from __future__ import annotations
+
+import pytest
+
+from sim.faults.case import play
+from sim.faults.generator import random_case
+
+BROKEN_ONCE = {
+    5001693: "an agent that began anew counted twice how fast its battery drains",
+}
+
+
+@pytest.mark.parametrize("seed", BROKEN_ONCE)
+def test_what_broke_once_holds(seed: int) -> None:
+    done = play(random_case(seed))
+    assert done.broken is None, f"{seed}: {done.broken}"
