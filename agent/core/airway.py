@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from agent.core.fleet_air import GIVES_UP_S, FleetAir, Wish
+from agent.core.fleet_air import GIVES_UP_S, STOP_LEG, FleetAir, Wish
 from agent.core.interface import (
     Action,
     Arrived,
@@ -47,8 +47,6 @@ from swarm.protocol.uav_messages import BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, adds_nothing
 from swarm.separation.shifted import hovering, landed, left_of_way, lifted, nominal
 
-STOP_LEG = 0
-"""Of orders that are this module's own; those of the core are numbered from 1."""
 _BY_GRANT = GoTo | Return | Prepare
 """Orders that may have to wait for a way."""
 _ASIDE_PATIENCE = 4.0
@@ -349,24 +347,26 @@ class Airway:
             self._looks_again = self._clear_behind(air) if flies else self._make_room(air, now_s)
         if self._moves and self._aloft:
             return []
+        wish, end_s = self._wish, self.sortie_end_s()
+        if wish is not None and self._aloft and self._fleet.must_land(wish, end_s, self._retry_s):
+            return self._come_down(wish)
         if self._aside is not None:
             if now_s - self._aside.since_s > _ASIDE_PATIENCE * self._retry_s:
                 self._aside, self._way = None, hovering(self._told_way)
             else:
                 self._pursue(air, self._aside, now_s)
-        wish = self._wish
         if wish is None or self._aside is not None:
             return []
-        waited_s, end_s = now_s - wish.since_s, self.sortie_end_s()
-        if self._aloft and self._fleet.must_land(wish, end_s, self._retry_s):
-            return self._come_down(wish)
         spent = wish.asked and self._mission_view.mission_s(now_s) > end_s
-        if wish.task is not None and (waited_s > GIVES_UP_S or spent):
+        if wish.task is not None and (now_s - wish.since_s > GIVES_UP_S or spent):
             self._wish = None
             self._way = hovering(self._told_way)
             self._actions.append(LogLine("no way", {"task": wish.task}))
             return [Refused(wish.order, "no way there becomes free", passes=True)]
         self._pursue(air, wish, now_s)
+        if self._aloft and (out := self._fleet.way_out(wish, self._retry_s)) is not None:
+            self._aside = out
+            self._pursue(air, out, now_s)
         return []
 
     def _come_down(self, wish: Wish) -> list[ReturnAdvised]:

@@ -17,14 +17,7 @@ from agent.core.decision import DecisionTurn, RefusedTasks
 from agent.core.energy import TOLERANCE_S
 from agent.core.flights import HomeFlight
 from agent.core.havens import Haven, Havens
-from agent.core.states import (
-    AT_BASE,
-    PAUSED_BY_OPERATOR,
-    VISITS_BASE,
-    AgentState,
-    TaskAttempt,
-    Trigger,
-)
+from agent.core.states import AT_BASE, PAUSED_BY_OPERATOR, VISITS_BASE, AgentState, Trigger
 from agent.core.tasking import Tasking
 from agent.core.time_limits import WITHOUT_AIM, TimeLimits
 from swarm.allocation import field
@@ -240,10 +233,7 @@ class FieldTasking(Tasking):
     ) -> None:
         task = self._replica.board[str(decision.task)]
         standing = self._visits.claim if self._visits.stands_at is not None else None
-        self._machine.take(Trigger.DECIDED if left is None else Trigger.DIVERTED)
-        self._free.retry_at_s, self._free.adrift = None, False
-        self._opened.clear()
-        self._attempt = TaskAttempt(held_at_s=now_s + self._timing.objection_window_s)
+        self._begin_attempt(now_s, left)
         ends_s = decision.sortie_end_s
         claim = Claim(
             ClaimPhase.PROPOSED,
@@ -256,8 +246,7 @@ class FieldTasking(Tasking):
         )
         told = self._choices.made_in_field(turn, epoch, decision, self._rank, left)
         if left is not None:
-            turns: dict[str, object] = {"task": left, "for": task.task}
-            self._log("turns aside", **turns, **self._choices.label)
+            self._note_turn(left, task.task)
         if standing is not None and standing.base is not None:
             self._attempt.departs_at_s = now_s + max(0.0, decision.depart_s - turn.now_s)
             claim = replace(claim, base=standing.base, stage=standing.stage)
@@ -414,6 +403,8 @@ class FieldTasking(Tasking):
                 self._release("a zone lies over it", now_s)
         if self._machine.state is AgentState.IDLE:
             self._free.adrift, self._free.to_decide = True, True
+            self._free.strays |= state is not AgentState.IDLE
+            self._free.strays |= self._flights.way_out() is not None
 
     def _reroute_to(self, task: TaskEntry, claim: Claim, now_s: float) -> None:
         way = self._flights.way_to_task(task.task, backwards=bool(claim.reversed))

@@ -28,6 +28,8 @@ from swarm.separation.slabs import POSITION_ERROR_M, apart
 from swarm.separation.straight_pieces import not_flown, thinned
 from swarm.separation.taken_ways import is_home
 
+STOP_LEG = 0
+"""Of orders that are the airway's own; those of the core are numbered from 1."""
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end, or is changed [s]."""
 GIVES_UP_S = 10.0
@@ -118,6 +120,12 @@ class FleetAir:
         self._air: SharedAir | None = None
         self._lost_s: dict[str, float] = {}
         """Who is lost, and since when [s mission time]."""
+        self._in_zone: tuple[tuple[float, float], float] | None = None
+        """Where it waits in a zone, seen from above [m], and since when [s]."""
+        self._out_from: object = None
+        """From which place, by which problem, the way out of a zone was looked for last."""
+        self._out_m: Point | None = None
+        """What was found."""
 
     @property
     def shared(self) -> SharedAir | None:
@@ -167,7 +175,7 @@ class FleetAir:
             air: in which.
             wish: what is to be flown.
             now_shift_m: how much higher than its own layer the UAV is.
-            aside: it is to make room, wherever that leads.
+            aside: it is to make room; wherever that leads, if it has no other corner.
         """
         me = self._mission_view.me
         if me is None:
@@ -176,6 +184,7 @@ class FleetAir:
         shifts_m.sort(key=lambda shift_m: abs(shift_m - now_shift_m))
         if wish.fixed:
             shifts_m = [0.0]
+        aside = aside and len(wish.corners_enu_m) == 1
         if not aside and wish.climbs:  # straight, or in a layer between two climbs
             yield 0.0, wish.corners_enu_m
             level = self._in_layer(wish, me.layer_m)
@@ -320,22 +329,54 @@ class FleetAir:
             sortie_end_s: by when it must have landed, its reserve kept [s mission time].
             retry_s: how long it takes until it looks again [s].
         """
-        waited_s = self._mission_view.now_s - wish.since_s
-        if waited_s > LEAVES_ZONE_S and self._is_in_zone():
+        if self._in_zone_s(wish) > LEAVES_ZONE_S:
             return True
+        waited_s = self._mission_view.now_s - wish.since_s
         late = self._mission_s + retry_s > self.sets_off_by_s(wish, sortie_end_s)
         return late and wish.task is None and waited_s > _TRIES * retry_s
 
-    def _is_in_zone(self) -> bool:
-        """Whether a zone has been drawn over it: beside one it may seem in by chance."""
+    def way_out(self, wish: Wish, retry_s: float) -> Wish | None:
+        """A wish to leave first the zone in which it waits for a way that leads farther.
+
+        None as long as it has not waited in one until it looks again, ``retry_s`` [s] later, or if
+        it could not go on from outside.
+        """
+        out_m, (here, *rest) = self._out_of_zone_m(), wish.corners_enu_m
+        if out_m is None or wish.fixed or not rest or self._in_zone_s(wish) < retry_s:
+            return None
+        there = self.in_own_layer(out_m)
+        is_next = math.dist(there[:2], rest[0][:2]) < _BESIDE_M
+        if (len(rest) == 1 and is_next) or not (is_next or self._is_clear(there, rest[0])):
+            return None
+        order, now_s = GoTo(STOP_LEG, there), self._mission_view.now_s
+        return Wish(order, now_s, (here, there), out_of_layer=wish.out_of_layer)
+
+    def _in_zone_s(self, wish: Wish) -> float:
+        """How long it has waited in a zone where ``wish`` begins, whatever it wished first [s]."""
+        here, now_s = wish.corners_enu_m[0][:2], self._mission_view.now_s
+        if self._out_of_zone_m() is None:
+            self._in_zone = None
+            return 0.0
+        if self._in_zone is None or self._in_zone[0] != here:
+            self._in_zone = here, now_s
+        return now_s - self._in_zone[1]
+
+    def _out_of_zone_m(self) -> Point | None:
+        """The nearest place outside of a zone that has been drawn over it [m]; None: it is in none.
+
+        Beside one it may seem in by chance.
+        """
         problem, place = self._mission_view.board.field_problem, self._mission_view.place_enu_m
         if not zones_in_force(self._replica) or problem is None or problem.network is None:
-            return False
-        row = problem.uav_ids.index(UavId(self._uav))
-        out_m = None if place is None else problem.network.way_out_m(row, place)
-        if place is None or out_m is None:
-            return False
-        return math.dist(place[:2], out_m[:2]) > POSITION_ERROR_M
+            return None
+        if place is None or UavId(self._uav) not in problem.uav_ids:
+            return None
+        if self._out_from != (place, problem):
+            row = problem.uav_ids.index(UavId(self._uav))
+            self._out_from, self._out_m = (place, problem), problem.network.way_out_m(row, place)
+        out_m = self._out_m
+        beside = out_m is None or math.dist(place[:2], out_m[:2]) <= POSITION_ERROR_M
+        return None if beside else out_m
 
     def standing(self) -> tuple[str, BaseStage] | None:
         """Base and stage of who stands there, by its own last word."""

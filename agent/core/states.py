@@ -306,6 +306,8 @@ class FreePeriod:
     """Mission time of that, or since it may decide anew [s]; orders claims of the same time."""
     adrift: bool = False
     """Whether its vehicle still flies to a task that it has lost."""
+    strays: bool = False
+    """Whether it hovers in a zone that is new, or still flies where new ones may be."""
     to_decide: bool = True
     """Whether anything has changed since it last looked for a task."""
     found_nothing: bool = False

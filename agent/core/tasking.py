@@ -202,6 +202,7 @@ class Tasking(AgentPart, ABC):
         if self._machine.state in FREE and self._free.to_decide:
             if not ready:
                 self._give_up_claim()
+                self._stop_straying()
             elif self._flights.problem is None:
                 self._decide(now_s)
             else:
@@ -353,17 +354,13 @@ class Tasking(AgentPart, ABC):
     ) -> None:
         task = self._replica.board[problem.task_ids[decision.task]]
         rank = ranks(epoch.sequence, problem.uav_ids)[self._uav]
-        self._machine.take(Trigger.DECIDED if left is None else Trigger.DIVERTED)
-        self._free.retry_at_s, self._free.adrift = None, False
-        self._opened.clear()
-        self._attempt = TaskAttempt(held_at_s=now_s + self._timing.objection_window_s)
+        self._begin_attempt(now_s, left)
         claim = Claim(
             ClaimPhase.PROPOSED, task.task, self._free.since_s, rank, decision.completion_s
         )
         told = self._choices.made(turn, problem, epoch, recording_rule, decision, claim, left)
         if left is not None:
-            turns: dict[str, object] = {"task": left, "for": task.task}
-            self._log("turns aside", **turns, **self._choices.label)
+            self._note_turn(left, task.task)
         self._order_to(task, idled=self._free.found_nothing)
         self._say(claim)
         self._note(
@@ -375,6 +372,18 @@ class Tasking(AgentPart, ABC):
             completion_s=decision.completion_s,
         )
         self._actions.append(told)
+
+    def _begin_attempt(self, now_s: float, left: str | None) -> None:
+        """It has decided on a task, instead of the one that it ``left``."""
+        self._machine.take(Trigger.DECIDED if left is None else Trigger.DIVERTED)
+        self._free.retry_at_s, self._free.adrift = None, False
+        self._opened.clear()
+        self._attempt = TaskAttempt(held_at_s=now_s + self._timing.objection_window_s)
+
+    def _note_turn(self, left: str, task: str) -> None:
+        """Log that it leaves one task for another."""
+        turns: dict[str, object] = {"task": left, "for": task}
+        self._log("turns aside", **turns, **self._choices.label)
 
     def _stay_idle(self, now_s: float) -> None:
         self._give_up_claim()
@@ -390,6 +399,12 @@ class Tasking(AgentPart, ABC):
             # By and by, lest a lost message strand a task; or when a refused one may be taken.
             until_s = self._refused.left_alone(now_s).values()
             free.retry_at_s = min([now_s + self._timing.announce_s, *until_s])
+
+    def _stop_straying(self) -> None:
+        """Hover, out of any zone: it knows too little to decide anything better yet."""
+        if self._free.strays:
+            self._free.strays = self._free.adrift = False
+            self._flights.stop()
 
     def _give_up_claim(self) -> None:
         """Say that the UAV is free, unless it has."""

@@ -1,0 +1,115 @@
+"""One agent that waits for air that another takes, in zones drawn over it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from agent.core.fleet_air import LEAVES_ZONE_S, STOP_LEG
+from agent.core.interface import Arrived, GoTo, Return
+from agent.core.states import AgentState
+from swarm.protocol.events import LinkChanged
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import TaskEntry
+from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
+from tests.support.builders import entry
+from tests.support.field_agent import FAR_BASE, FieldAgent, Script, square
+from tests.support.lone_agent import notes, orders
+
+FAR_AWAY = ((-900.0, 0.0, 10.0),)
+ACROSS = ((30.0, -80.0, 10.0), (30.0, 80.0, 10.0))
+"""Between where this one is and what lies east of it."""
+OVER = square("over", 0.0, 0.0, 8.0)
+"""A zone around where it hovers."""
+ROUND = tuple((*OVER.polygon_enu_m[corner], 10.0) for corner in (0, 1, 2, 3, 0))
+"""All along the border of that."""
+SOON_S = 1.1
+"""It looks for air again by then."""
+
+
+class Fleet:
+    """The agent of ``u0``, which keeps the air round its start, and ``u1``, who flies there."""
+
+    def __init__(self, *entries: TaskEntry) -> None:
+        self.agent = FieldAgent("u1", bases=[FAR_BASE])
+        self.agent.brief = replace(self.agent.brief, separation_m=5.0, band_m=(8.0, 12.0))
+        self.agent.fly_to(*entries)
+        self.other_flies(*FAR_AWAY)
+        self.agent.be_at((0.0, 0.0, 10.0), None)
+        self.agent.start_mission()
+
+    def other_flies(self, *path: Point) -> None:
+        """The other one is on its way along ``path``."""
+        way = ClaimedWay(0, path, flies=True)
+        self.agent.hear("u1", Claim(ClaimPhase.IDLE, None, 0.0, 1, 0.0, way=way))
+
+    def flights(self, since: int) -> list[GoTo]:
+        """Where it was sent since it had been ordered so often."""
+        return [order for order in orders(self.agent.log)[since:] if isinstance(order, GoTo)]
+
+
+def test_who_knows_too_little_to_decide_leaves_a_new_zone_all_the_same(script: Script) -> None:
+    fleet = Fleet()
+    agent = fleet.agent
+    agent.happen(LinkChanged(False), 1.0)
+    agent.happen(LinkChanged(True), 9.0)
+    before, turns = len(orders(agent.log)), len(script.turns)
+
+    agent.drawn(OVER, 9.1)
+
+    (left,) = fleet.flights(before)
+    assert max(map(abs, left.position_enu_m[:2])) == pytest.approx(8.0, abs=0.01)
+    assert len(script.turns) == turns
+    agent.run_until(9.3)
+    assert len(fleet.flights(before)) == 1
+
+
+def test_who_waits_in_a_zone_for_a_longer_way_leaves_it_first(script: Script) -> None:
+    fleet = Fleet(entry("t0", 100.0))
+    agent = fleet.agent
+    fleet.other_flies(*ACROSS)
+    before = len(orders(agent.log))
+    script.items = ["t0"]
+
+    agent.drawn(OVER, 5.0)
+    assert agent.task == "t0"
+    assert fleet.flights(before) == []
+    agent.run_until(5.0 + SOON_S)
+
+    (left,) = fleet.flights(before)
+    assert left.leg == STOP_LEG
+    out_enu_m = left.position_enu_m
+    assert max(map(abs, out_enu_m[:2])) == pytest.approx(8.0, abs=0.01)
+    agent.be_at(out_enu_m, None, 14.0)
+    agent.happen(Arrived(STOP_LEG))
+    agent.run_until(14.5)
+    fleet.other_flies(*FAR_AWAY)
+    assert agent.flight.task == "t0"
+    assert all(max(map(abs, via[:2])) >= 7.99 for via in agent.flight.via_enu_m)
+
+
+def test_who_finds_no_way_out_of_a_zone_lands_whatever_it_wished_meanwhile(
+    script: Script,
+) -> None:
+    fleet = Fleet(entry("t0", 100.0))
+    agent = fleet.agent
+    agent.happen(LinkChanged(False), 1.0)
+    agent.happen(LinkChanged(True), 5.0)
+    fleet.other_flies(*ROUND)
+    agent.drawn(OVER, 5.1)
+    script.items = ["t0"]
+    agent.run_until(7.0)
+    assert agent.task is None
+    agent.learn()
+    agent.learn()
+    assert agent.task == "t0"
+
+    agent.run_until(5.1 + LEAVES_ZONE_S - 0.1)
+    assert agent.state() is AgentState.FLYING
+    agent.run_until(5.1 + LEAVES_ZONE_S + SOON_S)
+
+    order = agent.last_order
+    assert isinstance(order, Return)
+    assert order.land
+    assert "lands where it is" in notes(agent.log)
