@@ -113,6 +113,11 @@ class Airway:
         self._unplaced: Callable[[], None] | None = None
         """Gives an order anew that waits until the vehicle has told where it flies."""
 
+    @property
+    def waits(self) -> bool:
+        """Whether an order waits for its way."""
+        return self._wish is not None
+
     # -- what the vehicle says -----------------------------------------------------------------
 
     def hear(self, event: Event) -> Event:

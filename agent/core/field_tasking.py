@@ -357,6 +357,7 @@ class FieldTasking(Tasking):
         if task.path_enu_m:
             attempt, backwards = self._attempt_at(task.task), bool(claim.reversed)
             self._flights.along_line(task, attempt, backwards=backwards)
+            self._attempt.too_late_at_s = self._limits.too_late_at_s(task, claim, now_s)
         else:
             self._attempt.served_at_s = now_s + task.service_s
 
@@ -369,9 +370,13 @@ class FieldTasking(Tasking):
         self._attempt.served_at_s = now_s + task.service_s
 
     def _give_up_what_is_late(self, now_s: float) -> None:
-        late_s = self._attempt.too_late_at_s
-        if late_s is not None and late_s <= now_s and self._task() is not None:
-            self._release("too late to be there in time", now_s)
+        late_s, serves = self._attempt.too_late_at_s, self._machine.state is AgentState.SERVING
+        if late_s is None or late_s > now_s or self._task() is None:
+            return
+        self._attempt.too_late_at_s = None
+        if self._airway.waits or not serves:
+            why = "its line is not free in time" if serves else "too late to be there in time"
+            self._release(why, now_s)
 
     def _drain(self, now_s: float) -> None:
         """The battery lasts less long than was known: give up what can't be done on it."""

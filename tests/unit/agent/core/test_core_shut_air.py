@@ -1,4 +1,4 @@
-"""One agent that waits for air that another takes, in zones drawn over it."""
+"""One agent that waits for air that another takes: a line that closes, zones drawn over it."""
 
 from __future__ import annotations
 
@@ -24,6 +24,7 @@ OVER = square("over", 0.0, 0.0, 8.0)
 """A zone around where it hovers."""
 ROUND = tuple((*OVER.polygon_enu_m[corner], 10.0) for corner in (0, 1, 2, 3, 0))
 """All along the border of that."""
+LINE = ((20.0, 0.0, 0.0), (90.0, 0.0, 0.0))
 SOON_S = 1.1
 """It looks for air again by then."""
 
@@ -47,6 +48,47 @@ class Fleet:
     def flights(self, since: int) -> list[GoTo]:
         """Where it was sent since it had been ordered so often."""
         return [order for order in orders(self.agent.log)[since:] if isinstance(order, GoTo)]
+
+
+def at_a_line(fleet: Fleet) -> FieldAgent:
+    """It has arrived where a line begins, 2 s before that closes."""
+    agent = fleet.agent
+    agent.be_at((20.0, 0.0, 10.0), None, 20.0)
+    agent.arrive(20.0)
+    assert agent.state() is AgentState.SERVING
+    return agent
+
+
+def to_a_line(script: Script) -> Fleet:
+    """It is on its way there."""
+    script.items = ["t0"]
+    fleet = Fleet(entry("t0", 20.0, path_enu_m=LINE, closes_s=22.0))
+    fleet.agent.run_until(19.0)
+    return fleet
+
+
+def test_a_line_to_which_the_air_is_free_too_late_is_given_up(script: Script) -> None:
+    fleet = to_a_line(script)
+    fleet.other_flies(*ACROSS)
+    agent = at_a_line(fleet)
+
+    agent.run_until(21.9)
+    assert agent.state() is AgentState.SERVING
+    agent.run_until(22.1)
+    fleet.other_flies(*FAR_AWAY)
+    agent.run_until(24.0)
+
+    assert agent.state() is AgentState.IDLE
+    assert agent.flight.position_enu_m[0] == 20.0
+
+
+def test_a_line_that_was_begun_in_time_is_flown_to_its_end(script: Script) -> None:
+    agent = at_a_line(to_a_line(script))
+
+    agent.run_until(60.0)
+
+    assert agent.state() is AgentState.SERVING
+    assert agent.flight.position_enu_m[0] == 90.0
 
 
 def test_who_knows_too_little_to_decide_leaves_a_new_zone_all_the_same(script: Script) -> None:
