@@ -5,7 +5,7 @@
   that is drawn over it leaves in time, and does not come back;
 - *out of its window*: no work that is done has begun before it opens, or after it closes, or ends
   after it is due;
-- *no slot*: no more UAVs stand at a base than it has slots;
+- *no slot*: nobody comes down at a base at all of whose slots UAVs stand, of which it may know;
 - *left undone*: see `Chances`.
 
 Read from the text of the field's problem and the tables of its legs, with nothing of how agents
@@ -15,7 +15,7 @@ decide.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import TYPE_CHECKING
@@ -58,6 +58,10 @@ REACTION_S = 5.0
 """Until when who hears of a zone has ordered its way out [s]."""
 
 
+def _all_is_heard(_one: str, _other: str, _since_s: float, _until_s: float) -> bool:
+    return False
+
+
 @dataclass(frozen=True, slots=True)
 class FieldJudge:
     """Judges one world that is over.
@@ -72,6 +76,10 @@ class FieldJudge:
     or, if it has to ask others first what it has missed, when they have answered: at the latest
     ``reaction_s`` later. Then its vehicle stops, and flies the shortest way out from rest; see
     `_leaves_s` for how long that takes. A vehicle that refuses that way gives it as long again.
+
+    Whose words reach each other nowhere from when one stands at a base until the other comes down
+    there cannot share its slots out: a base says nothing, and neither can wait for words that may
+    never come, as its battery ends before (``unheard``). Those who hear the one are not excused.
     """
 
     world: World
@@ -84,6 +92,8 @@ class FieldJudge:
     astray_m: float = 0.0
     """How far UAVs are at most from where they believe to be [m]."""
     flaws: Sequence[VehicleFlaw] = ()
+    unheard: Callable[[str, str, float, float], bool] = _all_is_heard
+    """Whether nothing that one UAV said from then until then [s] can be known to another."""
 
     def complaints(self, zones: Sequence[DrawnZone] | None = None) -> list[tuple[str, str]]:
         """Invariants that were broken, and how.
@@ -173,6 +183,7 @@ class FieldJudge:
                         other.uav
                         for other in stays
                         if other.begin_s <= stay.begin_s and stay.begin_s + 1e-9 < other.end_s
+                        if not self.unheard(stay.uav, other.uav, other.begin_s, stay.begin_s)
                     }
                 )
                 if len(here) > (base.slots or 0):

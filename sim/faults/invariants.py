@@ -47,6 +47,7 @@ from sim.faults.drawn_zones import DrawnZone, ordered_anew_s
 from sim.faults.field_judge import REACTION_S, Chances, FieldJudge
 from sim.faults.injector import FaultInjector
 from sim.faults.message_log import MessageLog, Violation
+from sim.faults.out_of_hearing import LOOK_EVERY_S, OutOfHearing
 from sim.faults.shut_air import ShutAir
 from sim.world.closest_approach import closest_approach
 from sim.world.engine import Process
@@ -62,7 +63,6 @@ from swarm.protocol.uav_messages import AttemptResult, Claim, ClaimPhase, Status
 
 SETTLED_S = 5.0
 """Calm for this long, the fleet must agree."""
-LOOK_EVERY_S = 0.5
 STEPS_AT_ONCE = 3000
 """More steps of all processes without time passing are a loop."""
 _LATE_S = 2.0
@@ -114,6 +114,7 @@ class InvariantChecker:
         """Watch this world, which has not begun."""
         self._world, self._network, self._injector = world, network, injector
         self.shut_air = ShutAir(world, network, injector)
+        self._out_of_hearing = OutOfHearing(world, network, SETTLED_S)
         self._zone_known_s: dict[str, dict[str, float]] = {}
         """By zone drawn in flight: since when each UAV's agent knows of it, or later [s]."""
         world.queue.at(LOOK_EVERY_S, self._look)
@@ -215,6 +216,8 @@ class InvariantChecker:
             self._world.queue.after(LOOK_EVERY_S, self._look)
         agents = [(p, core) for p, core in self._living() if isinstance(core, AgentCore)]
         self._note_known_zones(agents)
+        if any(base.slots is not None for base in self._world.mission.bases):
+            self._out_of_hearing.look()
         for process, _ in agents:
             self.shut_air.look(process)
         self._look_for_disobedience(agents)
@@ -394,7 +397,8 @@ class InvariantChecker:
             zones.append(replace(drawn, known_s=heed))
         flaws = self._injector.flaws
         known = {"stale_s": TELEMETRY_S, "astray_m": self._astray_m}
-        judge = FieldJudge(self._world, _LATE_S, flaws=flaws, **known)
+        unheard = self._out_of_hearing.all_along
+        judge = FieldJudge(self._world, _LATE_S, flaws=flaws, unheard=unheard, **known)
         for invariant, text in judge.complaints(zones):
             uav = text.partition(" ")[0]
             if not (invariant == "fell" and uav in self._injector.left_alone):

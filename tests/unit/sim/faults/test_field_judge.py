@@ -123,6 +123,25 @@ def test_no_more_stand_at_a_base_than_it_has_slots(
     assert broken(world) == ([] if is_sound else ["no slot"])
 
 
+@pytest.mark.parametrize(("heard_s", "is_sound"), [((0.0, 10.0), False), ((10.0, 20.0), True)])
+def test_who_comes_down_unheard_of_takes_nobodys_slot(
+    heard_s: tuple[float, float], is_sound: bool
+) -> None:
+    """Whether it is unheard of is asked of the time since the first has stood there."""
+    world = on_a_way((0.0, 0.0, 0.0), (1.0, 10.0, 0.0))
+    world.mission = replace(MISSION, bases=(replace(BASE, slots=1),))
+    world.flight_log.stays += [
+        BaseStay("u0", BASE.id, 10.0, ready_s=40.0, end_s=50.0),
+        BaseStay("u1", BASE.id, 20.0, ready_s=80.0),
+    ]
+
+    def unheard(one: str, other: str, since_s: float, until_s: float) -> bool:
+        return (one, other) == ("u1", "u0") and (since_s, until_s) == heard_s
+
+    complaints = FieldJudge(world, unheard=unheard).complaints()
+    assert [each for each, _ in complaints] == ([] if is_sound else ["no slot"])
+
+
 def test_nobody_flies_through_a_zone_of_the_scenario(world: World) -> None:
     where_it_works = Zone(ZoneId("z0"), ((55.0, 55.0), (65.0, 55.0), (65.0, 65.0), (55.0, 65.0)))
     world.mission = replace(MISSION, zones=(where_it_works,))
