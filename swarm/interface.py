@@ -186,11 +186,10 @@ def evaluate(mission: Mission, routes: Mapping[UavId, Sequence[TaskId]]) -> Eval
     """
     from swarm.allocation.objective import evaluate as value
     from swarm.allocation.problem import Problem
-    from swarm.model.mission import PLAIN_CONSTRAINTS
 
     if unknown := routes.keys() - {uav.id for uav in mission.uavs}:
         raise ValueError(f"no such UAV in {mission.name}: {', '.join(sorted(unknown))}")
-    if not PLAIN_CONSTRAINTS.issuperset(mission.constraints):
+    if not mission.is_flat:
         from swarm.allocation.field.lists import evaluate_in_field
 
         return evaluate_in_field(mission, routes)

@@ -56,6 +56,8 @@ class AgentContext:
     def __post_init__(self) -> None:
         own = self.uav, self.timing, self.replica, self.mission_view, self.peers, self.actions
         object.__setattr__(self, "airway", Airway(*own))
+        # Who brings a rule for missions in the field wants it asked wherever more is kept to.
+        self.mission_view.board.all_in_field = self.make_field_rule is not usual_field_rule
 
 
 class AgentPart:

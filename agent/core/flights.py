@@ -22,7 +22,7 @@ from swarm.allocation.problem import rest_to_rest_s
 from swarm.model import TaskId, UavId
 from swarm.protocol.field_messages import BaseSpec, ZoneSpec
 from swarm.protocol.fields import Point
-from swarm.protocol.messages import TaskEntry
+from swarm.protocol.messages import TaskEntry, UavSpec
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.separation.slabs import planned_apart_m
 from swarm.survey.structures import structure_middle_m
@@ -209,8 +209,10 @@ class Flights(AgentPart):
     def way_home(self) -> HomeFlight | None:
         """From where the UAV is; None where that is not known, or there is none."""
         problem, place_enu_m = self.problem, self._mission_view.place_enu_m
-        if problem is None or place_enu_m is None:
+        if place_enu_m is None:
             return None
+        if problem is None:
+            return self._straight_home(place_enu_m) if self._keeps_apart else None
         flown_m = self._mission_view.flown_m
         if self._home_from != (place_enu_m, flown_m, problem):
             way = self._widened(field.way_home(problem, self._row(problem), place_enu_m, flown_m))
@@ -230,10 +232,26 @@ class Flights(AgentPart):
 
         That leads to where it took off last, and up to a height of its own before, past others.
         """
-        brief, problem = self._replica.brief, self.problem
-        kept_apart = brief is not None and brief.separation_m is not None
+        problem = self.problem
         to_bases = problem is not None and problem.n_base > 0
-        return to_bases or (kept_apart and self._verticals is not None)
+        return to_bases or (self._keeps_apart and self._verticals is not None)
+
+    @property
+    def _keeps_apart(self) -> bool:
+        """Whether the fleet shares its air."""
+        brief = self._replica.brief
+        return brief is not None and brief.separation_m is not None
+
+    def _straight_home(self, place_enu_m: Point) -> HomeFlight | None:
+        """To the own start, of a mission in which nothing but its fleet is in the way."""
+        me = self._mission_view.me
+        if me is None:
+            return None
+        length_m = np.array([math.dist(place_enu_m, me.position_enu_m)])
+        speed_m_s, acceleration_m_s2 = self._told_motion(me)
+        duration_s = float(rest_to_rest_s(length_m, speed_m_s, acceleration_m_s2 or math.inf)[0])
+        end_enu_m = self._mission_view.in_layer(me.position_enu_m)
+        return HomeFlight((), end_enu_m, None, duration_s, self._lands_by_itself)
 
     def way_out(self) -> Point | None:
         """Where the UAV leaves the zone that it is in, in its layer; None: it is in none."""
@@ -366,19 +384,19 @@ class Flights(AgentPart):
 
         None: nobody can tell.
         """
-        me, place_enu_m, rates = (
-            self._mission_view.me,
-            self._mission_view.place_enu_m,
-            self.meter.rates,
-        )
+        me, place_enu_m = self._mission_view.me, self._mission_view.place_enu_m
         if me is None or place_enu_m is None:
             return None
-        speed_m_s = rates.speed_m_s or me.speed_m_s
-        acceleration_m_s2 = rates.acceleration_m_s2 or me.acceleration_m_s2
+        speed_m_s, acceleration_m_s2 = self._told_motion(me)
         if acceleration_m_s2 is None:
             return None
         length_m = np.array([math.dist(place_enu_m, stop_enu_m)])
         return float(rest_to_rest_s(length_m, speed_m_s, acceleration_m_s2)[0])
+
+    def _told_motion(self, me: UavSpec) -> tuple[float, float | None]:
+        """Speed [m/s] and acceleration [m/s²; None: none is given] by parameters and brief."""
+        rates = self.meter.rates
+        return rates.speed_m_s or me.speed_m_s, rates.acceleration_m_s2 or me.acceleration_m_s2
 
     def _flown(self, task: TaskEntry, point: Point) -> Point:
         return point if task.height_m is not None else self._mission_view.in_layer(point)

@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swarm.model import Mission, Task, TaskId
-from swarm.model.mission import PLAIN_CONSTRAINTS
 
 if TYPE_CHECKING:
     from coordinator.mission_view.results import MissionResult
@@ -37,7 +36,7 @@ def able_alone(mission: Mission, tasks: Iterable[Task]) -> Collection[TaskId]:
     appears later is not begun before.
     """
     known = [replace(task, opens_s=max(task.opens_s, task.appears_s)) for task in tasks]
-    if PLAIN_CONSTRAINTS.issuperset(mission.constraints):  # tables of legs may be large
+    if mission.is_flat:  # tables of legs may be large
         return {task.id for task in known if any(mission.success(u, task) for u in mission.uavs)}
     from swarm.allocation.field import FieldProblem, FieldState  # plain missions never load it
     from swarm.kernels.field_alone import earliest_alone

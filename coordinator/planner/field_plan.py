@@ -34,7 +34,6 @@ from swarm.allocation.field.problem import FloatArray
 from swarm.allocation.field.rules import FIELD_RULES
 from swarm.kernels.field import FIELD_GREEDY, FlownLists, fly_lists, run_rule
 from swarm.model import Mission, Plan, TaskId
-from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError
 
@@ -70,7 +69,7 @@ class FieldRequest:
 
 def is_field(mission: Mission) -> bool:
     """Whether ``mission`` asks for more than the planner of the paper's missions heeds."""
-    return not PLAIN_CONSTRAINTS.issuperset(mission.constraints)
+    return not mission.is_flat
 
 
 def make_field_plan(asked: FieldRequest) -> Plan:

@@ -35,7 +35,6 @@ from swarm.allocation.rules import GuidedRule, team_arrays, team_at_start
 from swarm.kernels.lower_level import EXACT_TASKS
 from swarm.kernels.routes import TeamArrays, optimise_routes
 from swarm.model import Mission, Plan, TaskId, UavId
-from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError, remedy_for_name
 
@@ -203,7 +202,7 @@ def make_plan(
     """
     if isinstance(method, str) and method not in METHODS:
         raise ValueError(f"method must be one of {', '.join(METHODS)}, not {method!r}")
-    if not PLAIN_CONSTRAINTS.issuperset(mission.constraints):
+    if not mission.is_flat:
         # Here: all that the field needs would let plans of plain missions begin later.
         from coordinator.planner.field_plan import FieldRequest, make_field_plan
 

@@ -17,7 +17,6 @@ from sim.world.motion import IdealMotion, Motion, Point, SmoothMotion
 from sim.world.wind import Wind, WindyMotion, gusts_of
 from swarm.model import Mission, Uav, UavId
 from swarm.model.frames import DEFAULT_ORIGIN, Origin
-from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.model.terrain import Terrain
 from swarm.model.vehicles import TRAITS, VehicleKind
 
@@ -310,7 +309,7 @@ def fleet_of(
             battery_failsafe=physics.battery_failsafe,
             position_failsafe_s=physics.position_failsafe_s,
             acceleration_m_s2=_acceleration_m_s2(uav, given_m_s2),
-            rounds_corners=not PLAIN_CONSTRAINTS.issuperset(mission.constraints),
+            rounds_corners=not mission.is_plain,
             airspeed_limit_m_s=uav.airspeed_m_s,
             wind=physics.wind(mission, place),
             vehicle=uav.vehicle,

@@ -236,7 +236,7 @@ def limit_s(case: Case) -> float:
     work_s += sum(each.kind is DisturbanceKind.ADD for each in case.schedule) * across_s
     if any(each.kind is DisturbanceKind.HOLD for each in case.schedule):
         last_s += OPERATOR_PATIENCE_S
-    if is_field(mission):
+    if not mission.is_plain:
         work_s += _field_work_s(mission, across_s) + timing.clear_s
     waits_s = timing.abandon_s + timing.stalemate_s + 2.0 * timing.reconsider_s + 60.0
     return max(last_s, appears_s) + work_s + waits_s

@@ -8,7 +8,6 @@ from pathlib import Path
 
 import numpy as np
 
-from coordinator.planner.field_plan import is_field
 from coordinator.planner.plan import make_plan
 from sim.faults.case import FIRST_ASTRAY, Case, CaseResult, most_of, play
 from sim.faults.field_missions import fair_drain_frac
@@ -103,7 +102,7 @@ def random_schedule(
         ]
 
     drawn = several("schedule", plain, 6) if plain else []
-    if of_field and is_field(mission):
+    if of_field and not mission.is_plain:
         drawn += several("field schedule", of_field, 3)
     return tuple(sorted(drawn, key=lambda each: each.at_s))
 
@@ -141,7 +140,7 @@ def _amount(
     if kind is DisturbanceKind.DRAIN:
         most = fair_drain_frac(mission, names[0])
         return max(0.01, round(most * float(rng.uniform(0.2, 1.0)), 2))
-    if is_field(mission) and kind is DisturbanceKind.SLOW:  # a reserve is not for more
+    if not mission.is_plain and kind is DisturbanceKind.SLOW:  # a reserve is not for more
         return round(float(rng.uniform(0.85, 1.0)), 2)
     low, high = {DisturbanceKind.WEATHER: (0.02, 0.5), DisturbanceKind.SKEW: (0.05, 1.0)}.get(
         kind, (0.4, 1.0)

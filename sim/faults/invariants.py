@@ -42,7 +42,6 @@ from agent.core.interface import GoTo
 from coordinator.core.active import CoordinatorCore
 from coordinator.core.standby import StandbyCore
 from coordinator.mission_view.mission_state import MissionState
-from coordinator.planner.field_plan import is_field
 from sim.faults.drawn_zones import DrawnZone, ordered_anew_s
 from sim.faults.field_judge import REACTION_S, Chances, FieldJudge
 from sim.faults.injector import FaultInjector
@@ -202,7 +201,7 @@ class InvariantChecker:
         battery, round the zones that its agent knows of. In a plain mission nothing forbids a task.
         """
         world, core, seen = self._world, process.core, self._world.seen(process.name)
-        if not is_field(world.mission) or seen is None or not isinstance(core, AgentCore):
+        if world.mission.is_plain or seen is None or not isinstance(core, AgentCore):
             return True
         tasks = {str(each.id): each for each in (*world.mission.tasks, *self._added())}
         zones = tuple(zone.zone() for zone in zones_in_force(core.replica))
@@ -294,7 +293,7 @@ class InvariantChecker:
             self._look_for_lost_tasks()
         if self.broken is None:
             self._look_at_the_count()
-        if self.broken is None and is_field(self._world.mission):
+        if self.broken is None and not self._world.mission.is_plain:
             self._look_at_the_flights()
             self._look_at_the_distances()
 
@@ -336,7 +335,7 @@ class InvariantChecker:
                 and (uav.id, task.id) not in world.refuses
                 and not self.shut_air.keeps_from(uav.id, task.id)
             ]
-            if able and is_field(world.mission):
+            if able and not world.mission.is_plain:
                 able = self._able_in_field(able, task)
             if able:
                 text = f"{task.id} is open, though {', '.join(able)} could have done it"

@@ -19,7 +19,6 @@ from sim.study.generator import mission_of, random_mission
 from sim.world.uncertainty import Uncertainty
 from swarm.allocation.problem import Problem
 from swarm.model import Mission
-from swarm.protocol.board import is_of_field
 from swarm.scenario.findings import number_of, shown
 
 NUMBERS = tuple(item.name for item in fields(Uncertainty) if item.type == "float")
@@ -127,7 +126,7 @@ class Study:
             case RandomMissions(shape=shape):
                 return shape is not None
             case SameMission(mission):
-                return is_of_field(mission)
+                return not mission.is_plain
 
     def points(self) -> tuple[DesignPoint, ...]:
         """All settings: the study's own, then every value of every number that is varied."""
@@ -170,7 +169,7 @@ def span_s(mission: Mission) -> float:
 
     That asks no policy that is studied, and is the same for all of them.
     """
-    if is_of_field(mission):
+    if not mission.is_plain:
         return field_span_s(mission)
     problem = Problem.from_mission(mission)
     return makespan_s(problem, value_per_time(problem))

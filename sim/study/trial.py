@@ -16,7 +16,6 @@ from sim.study.design import DesignPoint, Study, fate_seed, span_s
 from sim.study.policies.roster import PolicyRoster
 from sim.world.outcome import FlightOutcome, Score, score
 from swarm.model import Mission, Plan
-from swarm.protocol.board import is_of_field
 from swarm.runtime.clock import Clock
 
 BOUND = "clairvoyant"
@@ -167,7 +166,7 @@ class TrialRunner:
         seed = fate_seed(self._study.seed, job.trial)
         fate = world.uncertainty.draw(mission, span_s(mission), seed)
         rows: list[TrialRow] = []
-        for name, policy in self._in_field if is_of_field(mission) else self._policies:
+        for name, policy in self._in_field if not mission.is_plain else self._policies:
             flight = policy.fly(fate, self._plan, self._clock)
             row = row_of(world, job.trial, name, score(fate, flight), flight)
             rows.append(row)

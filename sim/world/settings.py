@@ -18,7 +18,6 @@ from sim.world.network import Network
 from sim.world.uncertainty import Realization
 from sim.world.vehicles import IdealVehicle, SimulatedVehicle, VehicleFactory
 from swarm.model import Mission, Plan, UavId
-from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
 from swarm.protocol.messages import Message
 from swarm.protocol.timing import Timing
@@ -59,7 +58,7 @@ def vehicles_of(
 
     ``errors`` of positions are for missions in the field alone.
     """
-    if PLAIN_CONSTRAINTS.issuperset(mission.constraints):
+    if mission.is_plain:
         return ideal_vehicle
     from sim.world.field_vehicle import field_vehicles  # plain missions never load it
 

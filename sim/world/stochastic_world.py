@@ -43,7 +43,6 @@ from sim.world.vehicles import (
 from sim.world.virtual_world import World
 from swarm.model import Mission, Task, Uav, UavId
 from swarm.model.ids import COORDINATOR, OPERATOR
-from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.protocol.events import CommonAction, CommonEvent, LogLine
 from swarm.protocol.messages import Message, MissionPhase, PlanEpoch
 from swarm.protocol.timing import PRESETS, LinkKind, LinkPreset, Timing
@@ -278,7 +277,7 @@ def _last_change_s(mission: Mission, fate: Realization) -> float:
 
 
 def _vehicles(fate: Realization) -> VehicleFactory:
-    if PLAIN_CONSTRAINTS.issuperset(fate.mission.constraints):
+    if fate.mission.is_plain:
         return partial(_vehicle, fate)
     takeoff_s = 0.0 if fate.uncertainty.ideal_communication else _TAKEOFF_S
     return vehicles_of(fate.mission, takeoff_s, fate if _troubled(fate) else None)

@@ -14,7 +14,11 @@ from swarm.model.vehicles import TRAITS, VehicleKind, turn_radius_m
 from swarm.model.zones import Zone
 
 PLAIN_CONSTRAINTS = frozenset({"vehicle", "acceleration_m_s2"})
-"""What `swarm.allocation.Problem` heeds; any other makes a mission one of the field."""
+"""What asks for nothing that is not in the paper's missions but other times of legs."""
+
+FLAT_CONSTRAINTS = PLAIN_CONSTRAINTS | {"separation_m", "band_m"}
+"""What `swarm.allocation.Problem` heeds: ways through shared air are as long as straight ones to
+plans and decisions. Any other makes a mission one of the field."""
 
 PointEnu = tuple[float, float, float]
 """East, north, up [m from the mission origin]."""
@@ -286,6 +290,16 @@ class Mission:
             "terrain": self.terrain is not None,
         }
         return (*found, *(key for key, has in of_mission.items() if has))
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it asks for nothing in the air that the paper's missions do not ask for."""
+        return PLAIN_CONSTRAINTS.issuperset(self.constraints)
+
+    @property
+    def is_flat(self) -> bool:
+        """Whether plans and decisions need no more than `swarm.allocation.Problem` tells."""
+        return FLAT_CONSTRAINTS.issuperset(self.constraints)
 
     def success(self, uav: Uav, task: Task) -> float:
         """p: probability that ``uav`` succeeds at ``task``; 0 means it never tries."""

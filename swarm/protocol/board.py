@@ -18,7 +18,6 @@ from swarm.allocation.lower_level import Rule, TeamState
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import RULE_NAMES, GuidedRule, rule_by_name
 from swarm.model import Mission, Task
-from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.protocol.attempts import Attempts
 from swarm.protocol.board_arrays import (
     BOARD_ARRAYS,
@@ -113,6 +112,8 @@ class TaskBoard:
         self._fleet: Mission | None = None
         """The mission of that brief, without tasks and zones."""
         self._fleet_in_field = False
+        self.all_in_field = False
+        """Whether tables of legs are made where a plain problem tells enough, too."""
         self._limited = False
         """Whether a plain problem does not tell all of some task."""
         self._mission: Mission | None = None
@@ -234,7 +235,8 @@ class TaskBoard:
         if brief is not None and brief is not self._brief:
             self._brief = brief
             self._fleet = BOARD_ARRAYS.fleet(self._name, brief)
-            self._fleet_in_field = is_of_field(self._fleet)
+            asks_more = self.all_in_field and not self._fleet.is_plain
+            self._fleet_in_field = asks_more or is_of_field(self._fleet)
         return self._fleet
 
     def _tasks_now(self) -> list[Task]:
@@ -325,7 +327,7 @@ def _untried(entry: TaskEntry) -> TaskState:
 
 def is_of_field(mission: Mission) -> bool:
     """Whether it asks for more than `swarm.allocation.Problem` heeds."""
-    return not PLAIN_CONSTRAINTS.issuperset(mission.constraints)
+    return not mission.is_flat
 
 
 def mission_of(replica: Replica, name: str, brief: MissionConfig) -> Mission:

@@ -21,7 +21,6 @@ from swarm.allocation.field.network import TooManyLegsError
 from swarm.kernels.field_alone import earliest_alone
 from swarm.model import Mission, Uav
 from swarm.model.layers import layers_over
-from swarm.model.mission import PLAIN_CONSTRAINTS
 from swarm.survey.facts import area_facts
 
 _TAKEOFF_S = 60.0
@@ -34,7 +33,7 @@ _MOST_BLUR_PX = 1.5
 
 def check_field(mission: Mission) -> list[CheckFinding]:
     """What there is to say of the field's constraints; nothing of a plain mission."""
-    if PLAIN_CONSTRAINTS.issuperset(mission.constraints):
+    if mission.is_plain:
         return []
     # What appears later is not begun before.
     tasks = [replace(task, opens_s=max(task.opens_s, task.appears_s)) for task in mission.tasks]

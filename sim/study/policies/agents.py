@@ -22,7 +22,6 @@ from sim.world.outcome import FlightOutcome, TaskVisit
 from sim.world.stochastic_world import StochasticWorld
 from sim.world.uncertainty import Realization
 from swarm.model import Mission, Plan
-from swarm.protocol.board import is_of_field
 from swarm.protocol.events import LogLine
 from swarm.runtime.clock import Clock
 
@@ -102,7 +101,7 @@ def fly_agents(
     )
     flown.run()
     tally = flown.tally
-    in_field = is_of_field(fate.mission)
+    in_field = not fate.mission.is_plain
     return FlightOutcome(
         visits=tuple(tally.visits),
         lost_uavs=tuple(flown.lost),
