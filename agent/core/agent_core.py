@@ -137,7 +137,7 @@ class AgentCore(AgentPart):
         self._commander = VehicleCommander(context, self._tasking, self._ending)
         self._station = GroundStation(context, self._tasking, self._commander, shown=shows_stations)
         self._sync = StateSync(context, self._tasking)
-        self._attention = Attention(context, self._sync, shows_stations=shows_stations)
+        self.attention = Attention(context, self._sync, shows_stations=shows_stations)
         self._queries = self._sync.queries
         self._recovered = RecoveredState(uav, memory, memory_age_s, timing)
         self._saving = SaveCondition(uav, self.replica, timing)
@@ -172,7 +172,7 @@ class AgentCore(AgentPart):
                 return []
         if isinstance(event, MessageReceived | MessagesReceived):
             event = self._sync.without_repeated(event, now_s)
-            if self._is_idle(now_s) and self._attention.only_remembers(event, now_s):
+            if self._is_idle(now_s) and self.attention.only_remembers(event, now_s):
                 return []
         if self._is_idle(now_s) and self._sync.only_meets(event, now_s):
             return self._end_step(now_s)

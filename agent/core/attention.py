@@ -6,6 +6,8 @@ while this UAV is busy with its own. It remembers what they say, and nothing els
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from agent.core.context import AgentContext, AgentPart
 from agent.core.state_sync import StateSync
 from agent.core.states import BUSY
@@ -44,6 +46,27 @@ class Attention(AgentPart):
             for message in messages:
                 self._sync.hear(message, now_s)
         return True
+
+    def may_read_later(self, message: Message, now_s: float) -> bool:
+        """Whether it would be only remembered now, and later as well, before anything else.
+
+        To be asked while nothing is due by itself; in shared air what others say of their ways is
+        looked at when they say it.
+        """
+        task = self._busy_with()
+        brief = self._replica.brief
+        if task is None or brief is None or brief.separation_m is not None:
+            return False
+        if self._replica.zone_edits:
+            return False
+        if self._mission_view.place_enu_m is None or self._announcer.has_news(now_s):
+            return False
+        return self._is_about_another(message, task)
+
+    def read(self, heard: Iterable[tuple[Message, float]]) -> None:
+        """Take in what could be read later, each as of when it was heard [s of ``now_s``]."""
+        for message, at_s in heard:
+            self._sync.hear(message, at_s)
 
     def _busy_with(self) -> str | None:
         """The task that this UAV flies to or works at; None where more is to be thought of."""

@@ -17,6 +17,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from agent.core.attention import Attention
 from agent.core.interface import Telemetry
 from swarm.protocol.events import (
     Cell,
@@ -27,7 +28,7 @@ from swarm.protocol.events import (
     SnapshotsReceived,
     Tick,
 )
-from swarm.protocol.messages import Snapshot
+from swarm.protocol.messages import Message, Snapshot
 from swarm.runtime.shell import Core
 
 _FROM_OTHERS = MessageReceived, MessagesReceived, SnapshotsReceived
@@ -135,6 +136,10 @@ class Process:
         telemetry_s: interval at which that is told to the core, whatever it hears [s]; None: before
             what it hears.
         together: whether the core takes several messages that come together as one event.
+        attention: of a core that only remembers most of what it hears; with ``telemetry_at`` it is
+            told of those words when something happens of which it thinks.
+        telemetry_at: where the vehicle was at an earlier virtual time, since which it has been
+            ordered nothing; None where nobody can tell.
     """
 
     def __init__(
@@ -151,10 +156,12 @@ class Process:
         telemetry: Callable[[], Telemetry | None] | None = None,
         telemetry_s: float | None = None,
         together: bool = False,
+        attention: Attention | None = None,
+        telemetry_at: Callable[[float], Telemetry | None] | None = None,
     ) -> None:
         self.name = name
         self.writer = writer
-        self.core = core
+        self._core = core
         self.over = False
         """Whether this life has ended, in whatever way."""
         self.held = False
@@ -171,14 +178,30 @@ class Process:
         self._telemetry = telemetry
         self._telemetry_s = telemetry_s
         self._together = together
+        self._attention = attention if telemetry_s is None else None
+        self._telemetry_at = telemetry_at
+        self._unread: list[tuple[Message, float]] = []
+        """Heard, and when by the own clock, and not told to the core yet."""
+        self._heard_s = -math.inf
+        """When the last of them was, in virtual time."""
         self._told_s = -math.inf
         self._now_s = -math.inf
         self._tick_at_s = math.inf
         self._inbox: deque[object] = deque()
 
+    @property
+    def core(self) -> Core[Any, Any]:
+        """What decides, knowing all that it has heard."""
+        self._read_up()
+        return self._core
+
+    @core.setter
+    def core(self, core: Core[Any, Any]) -> None:
+        self._core, self._attention = core, None
+
     def start(self) -> None:
         """Begin."""
-        self._act(self.core.start)
+        self._act(self._core.start)
         if self._telemetry_s is not None:
             self._queue.after(self._telemetry_s, self._stream_telemetry)
 
@@ -197,15 +220,19 @@ class Process:
         if self.held:
             self._inbox.append(event)
             return
+        if isinstance(event, MessageReceived) and self._may_read_later(event.message):
+            return
+        self._read_up()
         if isinstance(event, LinkChanged):
             self.linked = event.up
         heard = isinstance(event, _FROM_OTHERS)
         if heard and self._telemetry_s is None:
             self._tell_telemetry()
-        self._act(lambda now_s: self.core.step(event, now_s))
+        self._act(lambda now_s: self._core.step(event, now_s))
 
     def answer(self, *, whole: bool = False) -> Snapshot | None:
         """What it answers when asked, if need be for all it knows; None when it cannot."""
+        self._read_up()
         snapshot = self._whole if whole else self._snapshot
         if self.over or self.held or snapshot is None:
             return None
@@ -214,11 +241,12 @@ class Process:
     def resume(self) -> None:
         """Go on, with what has arrived meanwhile: first of all a deadline, if one has passed."""
         self.held = False
+        self._read_up()
         if self._telemetry_s is not None:
             self._tell_telemetry()
         if self._tick_at_s <= self._queue.now_s():
             self._tick_at_s = math.inf
-            self._act(lambda now_s: self.core.step(Tick(), now_s))
+            self._act(lambda now_s: self._core.step(Tick(), now_s))
         while self._inbox and not self.held:
             self.step(self._inbox.popleft())
 
@@ -226,6 +254,35 @@ class Process:
         """What the process's own clock shows; never goes back."""
         self._now_s = max(self._now_s, self._clock.local_s(self._queue.now_s()))
         return self._now_s
+
+    def _may_read_later(self, message: Message) -> bool:
+        """Whether nothing follows from ``message`` but that it is known; then it waits.
+
+        In a large fleet that is so of nearly all words. Where the vehicle is when one is heard
+        matters to whoever thinks; so of the words that wait together it is told with the last.
+        """
+        attention = self._attention
+        if attention is None or self._telemetry_at is None:
+            return False
+        now_s, due_s = self.now_s(), self._core.next_deadline_s()
+        if due_s is not None and due_s <= now_s:
+            return False
+        if not attention.may_read_later(message, now_s):
+            return False
+        self._unread.append((message, now_s))
+        self._heard_s = self._queue.now_s()
+        return True
+
+    def _read_up(self) -> None:
+        """Tell the core what has waited, in its order and as of the times at which it was heard."""
+        if not self._unread or self._attention is None or self._telemetry_at is None:
+            return
+        unread, self._unread = self._unread, []
+        told = None if self._heard_s <= self._told_s else self._telemetry_at(self._heard_s)
+        if told is not None:
+            self._told_s = self._heard_s
+            self._core.step(told, unread[-1][1])  # it is only noted, as nothing was due then
+        self._attention.read(unread)
 
     def _stream_telemetry(self) -> None:
         if self.over or self._telemetry_s is None:
@@ -239,7 +296,7 @@ class Process:
         told = None if self._telemetry is None or time_s <= self._told_s else self._telemetry()
         if told is not None:
             self._told_s = time_s
-            self._act(lambda now_s: self.core.step(told, now_s))
+            self._act(lambda now_s: self._core.step(told, now_s))
 
     def _act(self, act: Callable[[float], Any]) -> None:
         if self.over:
@@ -247,7 +304,7 @@ class Process:
         try:
             for action in act(self.now_s()):
                 self._owner.execute(self, action)
-            deadline_s = None if self.over else self.core.next_deadline_s()
+            deadline_s = None if self.over else self._core.next_deadline_s()
         except Exception as fault:  # noqa: BLE001 - the top of a process: the world is told
             self._owner.raised(self, fault)
             return

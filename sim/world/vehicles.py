@@ -152,7 +152,8 @@ class IdealVehicle(TracedVehicle):
             self.track.lift_off(order.position_enu_m, now_s + self._takeoff_s)
             self._later(now_s + self._takeoff_s, ready)
         elif order.resume:
-            self._later(now_s, self._telemetry(motion))
+            told = Telemetry(motion.position_enu_m(now_s), motion.velocity_enu_m_s(now_s), None)
+            self._later(now_s, told)
             self._later(now_s, ready)
         else:
             motion.fly_to(order.position_enu_m, self._speed_m_s, now_s, self._acceleration_m_s2)
@@ -179,11 +180,14 @@ class IdealVehicle(TracedVehicle):
 
     def telemetry(self) -> Telemetry | None:
         """Where it is now; None on the ground."""
-        return None if self._motion is None else self._telemetry(self._motion)
+        return self.telemetry_at(self._queue.now_s())
 
-    def _telemetry(self, motion: IdealMotion) -> Telemetry:
-        now_s = self._queue.now_s()
-        return Telemetry(motion.position_enu_m(now_s), motion.velocity_enu_m_s(now_s), None)
+    def telemetry_at(self, time_s: float) -> Telemetry | None:
+        """Where it was then, since when it has been ordered nothing."""
+        motion = self._motion
+        if motion is None:
+            return None
+        return Telemetry(motion.position_enu_m(time_s), motion.velocity_enu_m_s(time_s), None)
 
     def _later(self, time_s: float, report: VehicleReport) -> None:
         """Say ``report`` then, unless another order has come in between."""

@@ -53,7 +53,7 @@ from sim.world.settings import (
     WorldSettings,
 )
 from sim.world.track import Track
-from sim.world.vehicles import SimulatedVehicle, TracedVehicle, as_flown
+from sim.world.vehicles import IdealVehicle, SimulatedVehicle, TracedVehicle, as_flown
 from swarm.model import Mission
 from swarm.model.ids import COORDINATOR, FLEET, OPERATOR
 from swarm.model.layers import FlightLayers
@@ -127,8 +127,6 @@ class World:
         names = [ONLOOKER, COORDINATOR, *(uav.id for uav in mission.uavs)]
         names += [STANDBY] if self._setting.standby else []
         self._clocks = {name: self._setting.clocks.get(name, LocalClock()) for name in names}
-        self.processes = {name: self._process(name, 1_000_000) for name in names}
-        """The latest life of every process, by name."""
         self.operators: list[OperatorClient] = []
         """Every command given so far, and what has come of it."""
         self.fallen_s: dict[str, float] = {}
@@ -140,6 +138,8 @@ class World:
         self.flight_log = FlightLog(mission, self.tracks)
         """What they did."""
         self._vehicles = {str(uav.id): self._vehicle(uav.id) for uav in mission.uavs}
+        self.processes = {name: self._process(name, 1_000_000) for name in names}
+        """The latest life of every process, by name."""
         self._commanders: dict[str, Process] = {}
 
     def run(self, limit_s: float = math.inf) -> bool:
@@ -427,6 +427,7 @@ class World:
             memory_age_s=age_s,
             without_bus_s=self._setting.without_bus_s,
         )
+        vehicle = self._vehicles.get(name)
         return new(
             name,
             agent,
@@ -435,6 +436,8 @@ class World:
             telemetry=partial(self._telemetry, name),
             telemetry_s=self._setting.telemetry_s,
             together=True,
+            attention=agent.attention,
+            telemetry_at=vehicle.telemetry_at if isinstance(vehicle, IdealVehicle) else None,
         )
 
     def _coordinator(

@@ -49,15 +49,21 @@ def test_thinking_of_everything_leads_to_the_same_words_at_the_same_times(
     seed: int, uncertainty: Uncertainty, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     remembered: list[int] = []
-    only_remembers = Attention.only_remembers
+    only_remembers, may_read_later = Attention.only_remembers, Attention.may_read_later
 
     def counted(self: Attention, event: object, now_s: float) -> bool:
         only = only_remembers(self, event, now_s)  # type: ignore[arg-type]  # as it is called
         remembered.append(only and bool(event.messages))  # type: ignore[attr-defined]  # likewise
         return only
 
+    def waits(self: Attention, message: Message, now_s: float) -> bool:
+        may_wait = may_read_later(self, message, now_s)
+        remembered.append(may_wait)
+        return may_wait
+
     with monkeypatch.context() as patched:
         patched.setattr(Attention, "only_remembers", counted)
+        patched.setattr(Attention, "may_read_later", waits)
         heard = flown(uncertainty, seed)
     assert sum(remembered) > 100
     with monkeypatch.context() as patched:
