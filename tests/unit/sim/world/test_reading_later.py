@@ -24,6 +24,8 @@ class Compared(StochasticWorld):
 
     def _look(self) -> None:
         onlooker, busy = self.world.mission_state.replica, self.world.agents["u0"].replica
+        if self.world.processes["u0"].over:
+            return
         self.looks += 1
         self.differing += busy.claims.get("u1") != onlooker.claims.get("u1")
 
