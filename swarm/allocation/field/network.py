@@ -200,7 +200,7 @@ class FieldNetwork:
         """
         model, network = self._kind_of(uav)
         placed = self._placed(uav, place_enu_m, flown_m)
-        times_s: FloatArray = network.legs_from(*placed).times_s(model)[0]
+        times_s: FloatArray = network.legs_from_one(*placed).times_s(model)[0]
         flown_s: FloatArray = times_s * self.time_frac[uav]
         flown_s[: self._n_home] += self.land_s[uav]
         return flown_s
@@ -230,7 +230,7 @@ class FieldNetwork:
     ) -> FloatArray | None:
         """The same from anywhere, as `legs_from_s` has it, to a node."""
         _, network = self._kind_of(uav)
-        return network.legs_from(*self._placed(uav, place_enu_m, flown_m)).corners_m(0, end)
+        return network.legs_from_one(*self._placed(uav, place_enu_m, flown_m)).corners_m(0, end)
 
     def flown_enu_m(
         self, uav: int, corners_enu_m: FloatArray, end: int, *, out_of_layer: bool = False

@@ -32,6 +32,9 @@ IntArray = npt.NDArray[np.int64]
 _AT_ONCE = 50_000
 """Pairs of places that are looked at together: work arrays of some 100 MB."""
 
+_REMEMBERED = 32
+"""How many places at most legs are kept from."""
+
 _GAUSS = np.polynomial.legendre.leggauss(32)
 """Places within -1..1 and weights by which speeds round an arc are averaged."""
 
@@ -134,6 +137,7 @@ class LegNetwork:
         self._heights_m = _heights_m(self.node_enu_m, low_m, high_m)
         self._sides = airspace.sides(*self._heights_m)
         self._targets: dict[tuple[int, PathPlanner], Targets] = {}
+        self._asked: dict[tuple[object, ...], Legs] = {}
 
     def __reduce__(self) -> tuple[type[LegNetwork], tuple[object, ...]]:
         made_of = self._airspace, self.node_enu_m, *self._heights_m, self._ground, self._room_m
@@ -178,6 +182,17 @@ class LegNetwork:
             begin_m = np.broadcast_to(np.asarray(room_m, dtype=np.float64), (len(places_m),))
             over = _Over(self._ground, begin_m, self._room_m)
         return Legs(places_m, self.node_enu_m, blocks, over)
+
+    def legs_from_one(
+        self, place_enu_m: FloatArray, low_m: float, high_m: float, room_m: float = 0.0
+    ) -> Legs:
+        """The same from one (3,) place; kept for a while, since many ask for the same."""
+        asked = place_enu_m.tobytes(), low_m, high_m, room_m
+        if asked not in self._asked:
+            if len(self._asked) >= _REMEMBERED:
+                self._asked.clear()
+            self._asked[asked] = self.legs_from(place_enu_m, low_m, high_m, room_m)
+        return self._asked[asked]
 
     def _targets_of(self, side: int, planner: PathPlanner) -> Targets:
         if (side, planner) not in self._targets:

@@ -159,3 +159,26 @@ def test_a_network_may_be_empty() -> None:
     assert network.legs_from(np.zeros(3)).times_s(WINDY).shape == (1, 0)
     with pytest.raises(IndexError, match="no leg from place 0 to node 0"):
         network.legs.corners_m(0, 0)
+
+
+def test_legs_from_one_place_are_worked_out_once_and_are_those_from_anywhere() -> None:
+    network = random_network(3, margin_m=2.0)
+    place_m = np.array([100.0, 90.0, 5.0])
+
+    legs = network.legs_from_one(place_m, 5.0, 5.0)
+
+    assert network.legs_from_one(place_m.copy(), 5.0, 5.0) is legs
+    assert network.legs_from_one(place_m, 5.0, 6.0) is not legs
+    expected = network.legs_from(place_m, 5.0, 5.0)
+    assert legs.times_s(WINDY).tolist() == expected.times_s(WINDY).tolist()
+
+
+def test_legs_from_few_places_are_kept_so_that_a_long_flight_needs_no_more_memory() -> None:
+    network = LegNetwork(Airspace(), np.zeros((2, 3)))
+    place_m = np.zeros(3)
+    first = network.legs_from_one(place_m, 0.0, 0.0)
+
+    for number in range(1, 33):
+        network.legs_from_one(place_m + number, 0.0, 0.0)
+
+    assert network.legs_from_one(place_m, 0.0, 0.0) is not first
