@@ -17,6 +17,8 @@ def converted(name: str, value: object, dtype: type[_Scalar], n_axes: int) -> np
         ValueError: it is not such an array, or would lose something in becoming one: numbers their
             fractions, or truth values their meaning.
     """
+    if type(value) is np.ndarray and value.dtype == dtype and value.ndim == n_axes:
+        return np.ascontiguousarray(value)  # as nearly all are
     try:
         array = np.asarray(value)
         lossless = array.size == 0 or np.can_cast(array.dtype, dtype, "same_kind")

@@ -97,12 +97,13 @@ class FieldState:
             sequence: (n_uav,) UAVs by priority, each once; in the problem's order when None.
         """
         n_uav = problem.n_uav
-        order = np.arange(n_uav) if sequence is None else np.asarray(sequence)
-        if not np.array_equal(np.sort(order), np.arange(n_uav)):
-            raise ValueError(f"sequence must have each of {n_uav} UAVs once, not {sequence}")
-        rank = np.empty(n_uav, dtype=np.int64)
-        rank[order] = np.arange(n_uav)
-        rows = np.arange(n_uav)
+        rows = rank = np.arange(n_uav)
+        if sequence is not None:
+            order = np.asarray(sequence)
+            if not np.array_equal(np.sort(order), rows):
+                raise ValueError(f"sequence must have each of {n_uav} UAVs once, not {sequence}")
+            rank = np.empty(n_uav, dtype=np.int64)
+            rank[order] = rows
         return cls(
             free_s=np.zeros(n_uav),
             sortie_end_s=problem.first_s.copy(),
