@@ -42,6 +42,10 @@ class AgentState(Enum):
     LEFT = "its vehicle was given up, and nothing is left to wait for: the process ends"
     YIELDED = "another process flies this UAV: this one ends without a word"
 
+    # By which one it is: an Enum's own hash, that of the name, is Python code, and every step looks
+    # some twenty times for its state among others.
+    __hash__ = object.__hash__
+
 
 class Trigger(Enum):
     """What takes an agent from one state to the next."""
