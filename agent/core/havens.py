@@ -98,6 +98,8 @@ class Havens(AgentPart):
         row, base = problem.uav_ids.index(UavId(self._uav)), BaseId(haven.base.id)
         leg_s = problem.leg_s[problem.kind[row], problem.n_uav + problem.base_ids.index(base)]
         there = np.array([self._mission_view.is_open(task) for task in problem.task_ids], bool)
+        if not (there & problem.capable[row]).any():  # as mostly for who hovers
+            return False
         enter, leave = problem.enter, problem.enter[:, ::-1]
         line_s = problem.line_s[problem.kind[row]] + problem.service_s[:, None]
         in_time = np.maximum(haven.ready_s + leg_s[enter], problem.opens_s[:, None])
