@@ -245,6 +245,7 @@ class Bridge:
         ):
             self.strange_heartbeats += 1
             return
+        heartbeat = session.mission_part.read(heartbeat, firmware_of(heartbeat))
         if (
             before is not None
             and session.firmware is not None

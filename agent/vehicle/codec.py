@@ -60,6 +60,7 @@ _FRAME_BY_WIRE = {
     6: AltitudeFrame.HOME,
 }
 _LIFTS_NOTHING = (mavlink.MAV_BATTERY_FUNCTION_AVIONICS, mavlink.MAV_BATTERY_FUNCTION_PAYLOAD)
+_TOTAL_UNKNOWN = 0xFFFF
 _LANDED_BY_WIRE = {int(state): state for state in LandedState}
 _KIND_BY_WIRE = {int(kind): kind for kind in MissionKind}
 
@@ -379,7 +380,9 @@ _CONVERTERS: dict[int, Callable[[Any], Inbound | None]] = {
     mavlink.MAVLINK_MSG_ID_MISSION_COUNT: _mission(lambda raw, kind: MissionCount(raw.count, kind)),
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_INT: _mission(_mission_item),
     mavlink.MAVLINK_MSG_ID_MISSION_ACK: _mission(lambda raw, kind: MissionAck(raw.type, kind)),
-    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda raw: MissionCurrent(raw.seq),
+    mavlink.MAVLINK_MSG_ID_MISSION_CURRENT: lambda raw: MissionCurrent(
+        raw.seq, raw.total if 0 < raw.total < _TOTAL_UNKNOWN else None
+    ),
     mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED: lambda raw: MissionReached(raw.seq),
 }
 """Converters by message id; one returns None for contents that cannot be."""

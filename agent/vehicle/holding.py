@@ -129,6 +129,8 @@ class Holding(Activity):
             self.done = True
         elif not self.aloft:
             self._tell(self._disarm, self._firmware.disarm())
+        elif self._firmware.must_rise(heartbeat.custom_mode):
+            self._session.say(*self._mode.cancel(self._session.now_s))
         elif not self._firmware.is_commanded(heartbeat.custom_mode):
             # The guided mode begins with a stop, which is given the time to be seen.
             self._told = True

@@ -7,7 +7,7 @@ than the plane may descend, to where it is to touch down.
 Two waypoints stand on the line, where its slope begins and farther down: PX4 1.17 takes for the
 line of a landing that from the setpoint *before the last one* to the ground, when it comes home
 to one. With a circle alone it approached from wherever it had climbed for its return, and touched
-down 460 m beside the runway twice.
+down 460 m beside the runway twice. Others need one of the two.
 
 Leaves out: the wind, obstacles and the shape of the ground below the line, which are looked to by
 whoever chose the direction.
@@ -39,7 +39,19 @@ _LEVEL_M = 100.0
 _FARTHER_DOWN_FRAC = 0.7
 """Of the slope is still ahead at the second waypoint."""
 _CMD_NAV_WAYPOINT = 16
-_HEADING_REQUIRED, _LEAVES_ON_TANGENT = 1.0, 1.0
+_LEAVES_ON_TANGENT = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class LandingStyle:
+    """What firmwares differ in that fly such items."""
+
+    circle_heading: float = 1.0
+    """First parameter of the circle: 1, it is left where its tangent leads on."""
+    ground_param: float = math.nan
+    """Fourth parameter of the place to touch down at, which no plane on a runway minds."""
+    waypoints: int = 2
+    """On the line."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,25 +75,29 @@ class RunwayLanding:
         # Clockwise its centre is to the right of the line.
         return east_m + self.circle_m * ahead_north, north_m - self.circle_m * ahead_east, up_m
 
-    def items(self, runway: Runway, origin: Origin) -> tuple[MissionItem, ...]:
-        """The way down, to be put on the plane."""
+    def items(
+        self, runway: Runway, origin: Origin, first: int = 0, style: LandingStyle | None = None
+    ) -> tuple[MissionItem, ...]:
+        """The way down, to be put on the plane; its items are numbered from ``first`` on."""
+        style = style or LandingStyle()
         sea, nowhere = AltitudeFrame.MEAN_SEA_LEVEL, (AltitudeFrame.NONE, 0.0, 0.0, 0.0)
         circle = wgs84_from_enu(origin, self.circle_enu_m(runway))
         ground = wgs84_from_enu(origin, runway.position_enu_m)
-        down = (_HEADING_REQUIRED, self.circle_m, 0.0, _LEAVES_ON_TANGENT)
+        down = (style.circle_heading, self.circle_m, 0.0, _LEAVES_ON_TANGENT)
         slope = [
             wgs84_from_enu(origin, _before(runway, frac * self.line_m, frac * _APPROACH_M))
-            for frac in (1.0, _FARTHER_DOWN_FRAC)
+            for frac in (1.0, _FARTHER_DOWN_FRAC)[: style.waypoints]
         ]
         as_it_comes = (0.0, 0.0, 0.0, math.nan)
+        last = (0.0, 0.0, 0.0, style.ground_param)
         return (
-            MissionItem(0, _CMD_DO_LAND_START, *nowhere, current=True),
-            MissionItem(1, _CMD_NAV_LOITER_TO_ALT, sea, *circle, down),
+            MissionItem(first, _CMD_DO_LAND_START, *nowhere, current=first == 0),
+            MissionItem(first + 1, _CMD_NAV_LOITER_TO_ALT, sea, *circle, down),
             *(
                 MissionItem(seq, _CMD_NAV_WAYPOINT, sea, *place, as_it_comes)
-                for seq, place in enumerate(slope, start=2)
+                for seq, place in enumerate(slope, start=first + 2)
             ),
-            MissionItem(4, _CMD_NAV_LAND, sea, *ground, as_it_comes),
+            MissionItem(first + 2 + len(slope), _CMD_NAV_LAND, sea, *ground, last),
         )
 
 

@@ -229,6 +229,8 @@ class MissionCurrent:
     """MISSION_CURRENT."""
 
     seq: int
+    total: int | None = None
+    """How many items there are, as the firmware counts them; None: not told."""
 
 
 @dataclass(frozen=True, slots=True)

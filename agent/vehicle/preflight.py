@@ -14,6 +14,7 @@ from dataclasses import replace
 from agent.core.interface import Prepare
 from agent.vehicle.commands import CommandEnded, CommandOutcome
 from agent.vehicle.config import BridgeConfig, CommandStyle
+from agent.vehicle.firmware.arduplane import ArduPlane
 from agent.vehicle.firmware.failsafes import Failsafes
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import (
@@ -27,7 +28,7 @@ from agent.vehicle.messages import (
 from agent.vehicle.parameter_reading import PAUSE_TIMEOUTS, TRIES, ParameterReading
 from agent.vehicle.session import VehicleSession
 from swarm.model.frames import enu_from_wgs84, wgs84_from_enu
-from swarm.model.vehicles import TRAITS
+from swarm.model.vehicles import TRAITS, VehicleKind
 from swarm.protocol.fields import Point
 
 _SIMULATED = "SWARM_SIMULATED"
@@ -290,7 +291,9 @@ def wrong_kind(order: Prepare, firmware: Firmware | None) -> str | None:
     """Why the vehicle is not the one that the scenario has; None if it may be."""
     if firmware is None or firmware.kind is order.vehicle:
         return None
-    return f"the vehicle is a {firmware.kind}, the scenario has a {order.vehicle}"
+    told = f"the vehicle is a {firmware.kind}, the scenario has a {order.vehicle}"
+    mistaken = isinstance(firmware, ArduPlane) and order.vehicle is VehicleKind.QUADPLANE
+    return f"{told} (if it has rotors, set Q_MAV_TYPE 22)" if mistaken else told
 
 
 def boot_state(session: VehicleSession, firmware: Firmware, heartbeat: Heartbeat) -> str:

@@ -103,7 +103,7 @@ class Preparation:
         self._speed = CruiseSpeedSetting(order.speed_m_s, firmware, session)
         self._failsafes = FailsafeCheck(firmware, session)
         self._limits = LimitsCheck(firmware, session, order.speed_m_s)
-        self._runway = RunwayCheck(firmware, session, order.runway)
+        self._runway = RunwayCheck(firmware, session, order.runway, order.position_enu_m[2])
         self.waiting_for = "waiting for the autopilot"
         """What is missing, for people."""
         self.done = False
@@ -170,7 +170,7 @@ class Preparation:
         if self._mission is not None and self._mission_begun:
             self._follow_mission(self._mission, heartbeat)
         elif heartbeat.armed and firmware.is_taking_off(heartbeat.custom_mode):
-            self._follow_takeoff()
+            self._follow_takeoff(heartbeat.custom_mode)
         elif not firmware.is_commanded(heartbeat.custom_mode):
             self._get_commanded(heartbeat)
         elif not heartbeat.armed:
@@ -301,9 +301,18 @@ class Preparation:
         command = self._firmware.takeoff(self._start_alt_m(), home_alt_m(position))
         return self._ask(self._takeoff, command)
 
-    def _follow_takeoff(self) -> None:
+    def _follow_takeoff(self, custom_mode: int) -> None:
         """Wait for the end of a takeoff that the vehicle carries out in a mode of its own."""
+        firmware = self._firmware
         self._saw_takeoff = True
+        if (
+            firmware.has_taken_off(custom_mode)
+            and not self._flew
+            and (self.took_off or not self._consent.needed)
+        ):
+            self._session.say(*self._takeoff.command.cancel(self._session.now_s))
+            self._session.say(*self._ask(self._mode, firmware.set_commanded_mode()))
+            return
         if not self.took_off:
             # An earlier life's, or a pilot's.
             self._flown_by_pilot = self._consent.needed

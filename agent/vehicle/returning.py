@@ -155,7 +155,8 @@ class Returning(Activity):
             self._disarmed_since_s = session.now_s
         if heartbeat.armed and self._seen and not self._firmware.disarms_itself:
             session.say(*self._disarm_at_rest())
-        if not heartbeat.armed or not self.obeys(heartbeat.custom_mode):
+        mode = heartbeat.custom_mode
+        if not heartbeat.armed or not self.obeys(mode) or self._firmware.must_rise(mode):
             return
         if self._lands is None:
             self._lands = self._is_barred()

@@ -1,7 +1,8 @@
 """Puts its landing on a plane that needs a runway, before its motors start.
 
 First it is read how the plane lands, and whether its return mode leads there; then the landing is
-put on it as a mission, in place of whatever stood there, and read back. It stays there: what
+put on it as a mission, in place of whatever stood there, and read back; where the plane takes off
+by that mission, too, it is set to begin there. It stays there: what
 brings the plane home is the plane's own return, whoever orders it, and with nobody there at all.
 """
 
@@ -9,7 +10,7 @@ from __future__ import annotations
 
 from agent.core.interface import Runway
 from agent.vehicle.firmware.profile import Firmware
-from agent.vehicle.messages import Inbound, ParameterRead
+from agent.vehicle.messages import Inbound, MissionCurrent, MissionSetCurrent, ParameterRead
 from agent.vehicle.mission_transfer import MissionFailed, MissionPolicy, MissionTransfer
 from agent.vehicle.parameter_reading import PAUSE_TIMEOUTS, TRIES, ParameterReading
 from agent.vehicle.session import VehicleSession
@@ -21,11 +22,17 @@ class RunwayCheck:
     Args:
         firmware: of the plane, or of what needs no runway and is fine without.
         runway: where it is to land; None: it is not said.
+        up_m: height at which its take-off ends [m; mission origin].
     """
 
-    def __init__(self, firmware: Firmware, session: VehicleSession, runway: Runway | None) -> None:
+    def __init__(
+        self, firmware: Firmware, session: VehicleSession, runway: Runway | None, up_m: float
+    ) -> None:
         config = session.config
         self._firmware, self._session, self._runway = firmware, session, runway
+        self._up_m = up_m
+        self._begins_at: int | None = None
+        """The item that the plane says it would begin with."""
         self._needed = firmware.traits.needs_runway
         self._reading = ParameterReading(firmware, firmware.landing_names)
         policy = MissionPolicy(
@@ -46,12 +53,16 @@ class RunwayCheck:
             self._reading.on_message(message)
             session = self._session
             session.say(*self._transfer.on_message(message, session.now_s))
+        if isinstance(message, MissionCurrent):
+            self._begins_at = message.seq
 
     def advance(self) -> str | None:
         """Carry on, on the ground; why its motors are not started yet, in words."""
         now_s = self._session.now_s
-        if not self._needed or self._transfer.in_force is not None:
+        if not self._needed:
             return None
+        if self._transfer.in_force is not None:
+            return self._rewind()
         if self._transfer.busy:
             self._session.say(*self._transfer.on_time(now_s))
         elif self._runway is None:
@@ -61,6 +72,16 @@ class RunwayCheck:
         else:
             return self._put(self._runway)
         return self._putting
+
+    def _rewind(self) -> str | None:
+        """Let its mission begin where it takes off, whatever an earlier flight has left."""
+        session, first = self._session, self._firmware.first_item
+        if first is None or self._begins_at == first:
+            return None
+        if session.now_s >= self._next_s:
+            self._next_s = session.now_s + session.config.commands.ack_timeout_s
+            session.say(MissionSetCurrent(first))
+        return "setting the first item of its mission"
 
     @property
     def _putting(self) -> str:
@@ -98,7 +119,8 @@ class RunwayCheck:
             self.failure = f"its landing cannot be put on it: {self._fault}"
             return self.failure
         self._uploads += 1
-        items = landing.items(runway, config.origin)
+        self._begins_at = None  # what was told before is of an earlier mission
+        items = self._firmware.runway_mission(landing, runway, self._up_m, config.origin)
         session.say(*self._transfer.upload(items, session.now_s))
         return self._putting
 

@@ -18,6 +18,7 @@ from agent.vehicle.conversation import Conversation
 from agent.vehicle.firmware import unsupported
 from agent.vehicle.firmware.profile import Firmware
 from agent.vehicle.messages import Inbound
+from agent.vehicle.mission_part import MissionPart
 from agent.vehicle.onboard_fence import OnboardFence
 from agent.vehicle.onboard_mission import OnboardMission
 from agent.vehicle.parameter_override import ParameterOverride
@@ -104,6 +105,8 @@ class VehicleSession(Conversation):
         super().__init__(config, signing)
         self.contact = Contact(config.system_id)
         self.vehicle = VehicleState()
+        self.mission_part = MissionPart()
+        """Which part of its mission it flies, where its mode does not say who has ordered it."""
         self.safety = SafetyMonitor(config)
         self.position_filter = PositionFilter()
         self.firmware: Firmware | None = None
@@ -267,6 +270,7 @@ class VehicleSession(Conversation):
 
     def on_message(self, message: Inbound) -> None:
         """Pass on what is no heartbeat, position or acknowledgement."""
+        self.mission_part.on_message(message)
         if self.mission is not None:
             self.mission.on_message(message)
         if self.fence is not None:
@@ -351,6 +355,7 @@ class VehicleSession(Conversation):
     def forget_vehicle(self) -> None:
         """The autopilot began anew: nothing is known of it any more."""
         self.vehicle = VehicleState()
+        self.mission_part = MissionPart()
         self.safety = SafetyMonitor(self.config)
         self.position_filter = PositionFilter()
         self.camera = CameraControl(self)

@@ -256,6 +256,14 @@ class FlightStateMachine:
         target_enu_m = (east_m, north_m, max(up_m, return_up_m))
         self._leave(MotionPhase.CLIMBING, target_enu_m, self._speed(ParameterRole.CLIMB_M_S), now_s)
 
+    def land_on_runway(self, landing_enu_m: RunwayPlaces, now_s: float) -> None:
+        """Come down from where it is, on a circle and along a line; of no copter."""
+        self._landing_enu_m = landing_enu_m
+        if self._on_runway is not None and not self.on_ground:
+            self.activity = MotionPhase.RETURNING
+            self._timer_s = self._near_s = None
+            self._on_runway.climb_to(landing_enu_m[0], now_s)
+
     def deadline_s(self) -> float | None:
         """When the activity ends by itself [s]; None if it lasts."""
         if self.activity in (MotionPhase.GROUNDED, MotionPhase.HOLDING):

@@ -98,6 +98,13 @@ class MissionFlight:
         self.climb_due = False
         self._flight.land(now_s)
 
+    def come_down(self, now_s: float) -> None:
+        """To the circle before a runway, and down from there."""
+        self.climb_due = False
+        landing_enu_m = self._pilot.flavour.landing_enu_m(self._pilot)
+        if landing_enu_m is not None:
+            self._flight.land_on_runway(landing_enu_m, now_s)
+
     def return_home(self, now_s: float) -> None:
         """Return home and land, in the mode for it where the mission ends so."""
         if self._behaviour.forgets_mode:

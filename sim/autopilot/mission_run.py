@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.events import FirmwareEvent
-from sim.autopilot.flight import Milestone
+from sim.autopilot.flight import FlightMode, Milestone, MotionPhase
 from sim.autopilot.mission_flight import MissionFlight
 from sim.autopilot.mission_item import LOOKS, StoredMissionItem
 
@@ -76,6 +76,26 @@ class MissionRun:
         first = self._store.next_navigation(self._first_seq)
         item = None if first is None else self._store.item(first)
         return item is not None and item.command == mavlink.MAV_CMD_NAV_TAKEOFF
+
+    @property
+    def can_rise(self) -> bool:
+        """Whether it may be begun on the ground."""
+        return self._behaviour.climbs_first or self.starts_with_take_off
+
+    @property
+    def leaves_ground(self) -> bool:
+        """Whether it does so as soon as its mode is entered, or the motors run."""
+        by_itself = self._behaviour.takes_off_by_itself and self.starts_with_take_off
+        return self.flight.climb_due or by_itself
+
+    def lands_instead(self, now_s: float) -> bool:
+        """Go on with the mission's landing, where the way home leads there; whether it does."""
+        landing = self._pilot.flavour.lands_by_mission(self._pilot)
+        if landing is None or self._pilot.flight.on_ground:
+            return False
+        self.set_current(landing, now_s)
+        self._pilot.enter(FlightMode.AUTO, now_s)
+        return True
 
     def start_or_resume(self, now_s: float) -> None:
         """Go on with the current item; from the beginning if there is none."""
@@ -178,6 +198,8 @@ class MissionRun:
                 self._hold(max(0.0, item.params[0]), at_s)
             case mavlink.MAV_CMD_NAV_LAND, Milestone.REACHED if not self._landing:
                 self._land(at_s)
+            case mavlink.MAV_CMD_NAV_LOITER_TO_ALT, Milestone.UNDERWAY:
+                self._follow_way_down()
             case (
                 mavlink.MAV_CMD_NAV_LAND | mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH,
                 Milestone.LANDED,
@@ -242,10 +264,20 @@ class MissionRun:
                 self._leave_by_returning(now_s)
             case mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH:
                 self.flight.return_home(now_s)
+            case mavlink.MAV_CMD_NAV_LOITER_TO_ALT:
+                self.flight.come_down(now_s)
             case mavlink.MAV_CMD_NAV_LAND if item.lat_e7 == 0 and item.lon_e7 == 0:
                 self._land(now_s)
             case _:
                 self.flight.navigate(item, now_s, passes=self._passes(item))
+
+    def _follow_way_down(self) -> None:
+        """The circle is left, and all that follows is one line down."""
+        commands = [item.command for item in self._store.items]
+        land = mavlink.MAV_CMD_NAV_LAND
+        if self._pilot.flight.activity is MotionPhase.LANDING and land in commands:
+            self._go_to(commands.index(land))
+            self._landing = True
 
     def _passes(self, item: StoredMissionItem) -> bool:
         """Whether the mission goes on from a place to another without a pause."""

@@ -1,7 +1,6 @@
 """What the autopilot allows and does: modes, arming, targets, home, mission.
 
-Everything that happens by itself happens at its own instant, however late the next `step` comes,
-so flights do not depend on how often the vehicle is called.
+What happens by itself happens at its own instant, however late and seldom `step` is called.
 """
 
 from __future__ import annotations
@@ -238,8 +237,7 @@ class Pilot:
             return "requires position"
         if mode is not FlightMode.AUTO:
             return None
-        rises = self.flavour.missions.climbs_first or self.run.starts_with_take_off
-        grounded = self.armed and self.flight.on_ground and not rises
+        grounded = self.armed and self.flight.on_ground and not self.run.can_rise
         if self.run.present and grounded:
             self.narrator.tell(FirmwareEvent.MISSION_WITHOUT_TAKE_OFF)
         return "init failed" if grounded or not self.run.present else None
@@ -263,7 +261,7 @@ class Pilot:
     def _fly(self, mode: FlightMode, now_s: float) -> None:
         """Begin to do what a mode is for."""
         if mode is FlightMode.AUTO:
-            if self._auto_armed or not self.flight.on_ground or self.run.flight.climb_due:
+            if self._auto_armed or not self.flight.on_ground or self.run.leaves_ground:
                 self.narrator.tell(FirmwareEvent.MISSION_BEGUN)
                 self.run.start_or_resume(now_s)
         elif mode is FlightMode.TAKEOFF:
@@ -280,6 +278,8 @@ class Pilot:
             self.stay_on_ground(now_s)
 
     def _return(self, now_s: float) -> None:
+        if self.run.lands_instead(now_s):
+            return
         self.flight.return_home(now_s, self.flavour.landing_enu_m(self))
         if self.flight.activity is MotionPhase.CLIMBING:
             up_m = self.flight.motion.target_enu_m[2]

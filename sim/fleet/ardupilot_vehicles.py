@@ -141,6 +141,43 @@ _QUADPLANE: Final = {
 }
 """``quadplane.parm``, with the kind of vehicle told, and no remote control."""
 
+_PLANE: Final = {
+    **_CALIBRATED,
+    **_RADIO,
+    "AIRSPEED_MIN": 10,
+    "AIRSPEED_MAX": 30,
+    "AIRSPEED_CRUISE": 22,
+    "ARSPD_USE": 1,
+    "BATT_MONITOR": 4,
+    "BATT_CAPACITY": _CAPACITY_MAH,
+    "KFF_RDDRMIX": 0.5,
+    "LAND_FLARE_SEC": 3,
+    "LAND_PITCH_DEG": 1,
+    "NAVL1_PERIOD": 15,
+    "PTCH_LIM_MAX_DEG": 25,
+    "PTCH_LIM_MIN_DEG": -20,
+    "PTCH_RATE_D": 0.007265,
+    "PTCH_RATE_FF": 0.595723,
+    "PTCH_RATE_I": 0.11,
+    "PTCH_RATE_P": 0.15,
+    "PTCH2SRV_RMAX_DN": 90,
+    "PTCH2SRV_RMAX_UP": 90,
+    "PTCH2SRV_TCONST": 0.25,
+    "RLL_RATE_D": 0.017430,
+    "RLL_RATE_FF": 0.237212,
+    "RLL_RATE_I": 0.25,
+    "RLL_RATE_P": 0.3,
+    "RLL2SRV_RMAX": 90,
+    "RLL2SRV_TCONST": 0.25,
+    "ROLL_LIMIT_DEG": 65,
+    "RTL_AUTOLAND": 2,
+    "THR_FAILSAFE": 0,
+    "THR_MAX": 100,
+    "TRIM_THROTTLE": 50,
+    "WP_RADIUS": 50,
+}
+"""``plane.parm``, with a return that leads to the landing, and no remote control."""
+
 ARDUPILOT_VEHICLES: Final[Mapping[VehicleKind, ArduPilotVehicle]] = MappingProxyType(
     {
         VehicleKind.COPTER: ArduPilotVehicle("SWARM_SITL_ARDUCOPTER", "arducopter", "+", _COPTER),
@@ -148,5 +185,6 @@ ARDUPILOT_VEHICLES: Final[Mapping[VehicleKind, ArduPilotVehicle]] = MappingProxy
         VehicleKind.QUADPLANE: ArduPilotVehicle(
             "SWARM_SITL_PLANE", "arduplane", "quadplane", _QUADPLANE
         ),
+        VehicleKind.PLANE: ArduPilotVehicle("SWARM_SITL_PLANE", "arduplane", "plane", _PLANE),
     }
 )

@@ -19,6 +19,7 @@ space, a star or a colon in that name ends it.
 
 from __future__ import annotations
 
+import math
 import os
 import re
 import tempfile
@@ -48,7 +49,7 @@ _PX4_MOST: Final = 10
 """From its eleventh instance on PX4 speaks to one and the same UDP port."""
 
 _HEADING_DEG: Final = 0.0
-"""In which they stand; the models of PX4's simulator know no other."""
+"""In which they stand unless it matters; the models of PX4's simulator know no other."""
 
 
 _PARAMETER_FILE: Final = "vehicle.parm"
@@ -127,7 +128,7 @@ class SitlFirmware:
         command = (
             *(str(program), "--model", vehicle.model),
             *("--speedup", f"{speedup:g}"),
-            *("--home", f"{lat_deg:.7f},{lon_deg:.7f},{alt_m:.2f},{_HEADING_DEG:g}"),
+            *("--home", f"{lat_deg:.7f},{lon_deg:.7f},{alt_m:.2f},{_heading_deg(uav):g}"),
             *("--defaults", _PARAMETER_FILE),
             *("--instance", str(number)),
             *("--sysid", str(number + 1)),
@@ -164,6 +165,12 @@ class SitlFirmware:
 
     def _folder(self, number: int) -> str:
         return f"{self.kind}-{number + 1}"
+
+
+def _heading_deg(uav: Uav) -> float:
+    """In which it stands: on a runway in that of its landing, clockwise from north."""
+    heading_rad = uav.landing_heading_rad
+    return _HEADING_DEG if heading_rad is None else round(math.degrees(heading_rad), 3)
 
 
 def find_firmware(

@@ -23,16 +23,18 @@ from agent.core.interface import (
     Hold,
     Home,
     Landed,
+    MotorsRun,
     Prepare,
     Refused,
     Return,
+    ReturnBegun,
     Runway,
     Swap,
     Swapped,
     VehicleReady,
 )
 from agent.vehicle.config import CommandStyle
-from sim.autopilot.config import ServedBase, VehicleConfig
+from sim.autopilot.config import ServedBase
 from sim.autopilot.firmware import FirmwareModelName, firmware_model
 from sim.autopilot.flight import FlightMode
 from sim.fleet.ardupilot_vehicles import ARDUPILOT_VEHICLES
@@ -48,11 +50,7 @@ pytestmark = pytest.mark.sitl
 
 CIRCLE_M, ON_CIRCLE_M = 60.0, 60.0 * 1.15 + 0.1
 EASTWARDS_RAD = math.pi / 2.0
-FLAVOURS = {
-    VehicleKind.ROVER: FirmwareModelName.ARDUPILOT,
-    VehicleKind.QUADPLANE: FirmwareModelName.ARDUPILOT,
-    VehicleKind.PLANE: FirmwareModelName.PX4,
-}
+ARDUPILOT, PX4 = FirmwareModelName.ARDUPILOT, FirmwareModelName.PX4
 VEHICLES = {
     VehicleKind.ROVER: replace(VEHICLE, vehicle=VehicleKind.ROVER, acceleration_m_s2=1.0),
     VehicleKind.QUADPLANE: replace(VEHICLE, vehicle=VehicleKind.QUADPLANE, circle_m=CIRCLE_M),
@@ -77,7 +75,16 @@ STARTS = {
         runway=Runway(HOME_M, EASTWARDS_RAD),
     ),
 }
-KINDS = pytest.mark.parametrize("kind", list(VEHICLES))
+KINDS = pytest.mark.parametrize(
+    ("kind", "flavour"),
+    [
+        (VehicleKind.ROVER, ARDUPILOT),
+        (VehicleKind.QUADPLANE, ARDUPILOT),
+        (VehicleKind.PLANE, PX4),
+        (VehicleKind.PLANE, ARDUPILOT),
+    ],
+)
+PLANES = pytest.mark.parametrize("flavour", [PX4, ARDUPILOT])
 FAR = {
     VehicleKind.ROVER: (5.0, 80.0, 0.0),
     VehicleKind.QUADPLANE: (5.0, 900.0, 30.0),
@@ -85,13 +92,12 @@ FAR = {
 }
 
 
-def joined(kind: VehicleKind, vehicle: VehicleConfig | None = None) -> JoinedFlight:
-    flavour = firmware_model(FLAVOURS[kind], kind)
-    return JoinedFlight(CONFIG, flavour, vehicle or VEHICLES[kind])
+def joined(kind: VehicleKind, flavour: FirmwareModelName = ARDUPILOT) -> JoinedFlight:
+    return JoinedFlight(CONFIG, firmware_model(flavour, kind), VEHICLES[kind])
 
 
-def started(kind: VehicleKind) -> JoinedFlight:
-    flight = joined(kind)
+def started(kind: VehicleKind, flavour: FirmwareModelName = ARDUPILOT) -> JoinedFlight:
+    flight = joined(kind, flavour)
     flight.to_bridge(STARTS[kind])
     flight.run_until(VehicleReady())
     return flight
@@ -144,8 +150,8 @@ def test_a_plane_passes_its_target_and_waits_on_a_circle() -> None:
 
 
 @KINDS
-def test_it_is_stopped_and_goes_on(kind: VehicleKind) -> None:
-    flight = started(kind)
+def test_it_is_stopped_and_goes_on(kind: VehicleKind, flavour: FirmwareModelName) -> None:
+    flight = started(kind, flavour)
     flight.to_bridge(GoTo(1, FAR[kind]))
     flight.wait(6.0)
     here_m = flight.vehicle.pilot.position_enu_m(flight.now_s)
@@ -162,8 +168,10 @@ def test_it_is_stopped_and_goes_on(kind: VehicleKind) -> None:
 
 
 @KINDS
-def test_killed_on_its_way_and_started_anew_it_goes_on(kind: VehicleKind) -> None:
-    flight = started(kind)
+def test_killed_on_its_way_and_started_anew_it_goes_on(
+    kind: VehicleKind, flavour: FirmwareModelName
+) -> None:
+    flight = started(kind, flavour)
     flight.to_bridge(GoTo(3, FAR[kind]))
     flight.wait(5.0)
     flight.restart_bridge(dead_s=4.0)
@@ -174,8 +182,8 @@ def test_killed_on_its_way_and_started_anew_it_goes_on(kind: VehicleKind) -> Non
 
 
 @KINDS
-def test_its_pilot_takes_it_over(kind: VehicleKind) -> None:
-    flight = started(kind)
+def test_its_pilot_takes_it_over(kind: VehicleKind, flavour: FirmwareModelName) -> None:
+    flight = started(kind, flavour)
     flight.to_bridge(GoTo(1, FAR[kind]))
     flight.wait(3.0)
     flight.vehicle.pilot.set_mode(FlightMode.MANUAL, flight.now_s)
@@ -183,8 +191,10 @@ def test_its_pilot_takes_it_over(kind: VehicleKind) -> None:
 
 
 @KINDS
-def test_another_kind_than_the_scenarios_is_not_started(kind: VehicleKind) -> None:
-    flight = joined(kind)
+def test_another_kind_than_the_scenarios_is_not_started(
+    kind: VehicleKind, flavour: FirmwareModelName
+) -> None:
+    flight = joined(kind, flavour)
     flight.to_bridge(replace(STARTS[kind], vehicle=VehicleKind.COPTER))
     flight.wait(20.0)
     assert flight.waits_for == f"the vehicle is a {kind}, the scenario has a copter"
@@ -192,9 +202,9 @@ def test_another_kind_than_the_scenarios_is_not_started(kind: VehicleKind) -> No
 
 
 @KINDS
-def test_it_is_not_commanded_by_missions(kind: VehicleKind) -> None:
-    flavour = firmware_model(FLAVOURS[kind], kind)
-    flight = JoinedFlight(replace(CONFIG, command=CommandStyle.MISSION), flavour, VEHICLES[kind])
+def test_it_is_not_commanded_by_missions(kind: VehicleKind, flavour: FirmwareModelName) -> None:
+    config, model = replace(CONFIG, command=CommandStyle.MISSION), firmware_model(flavour, kind)
+    flight = JoinedFlight(config, model, VEHICLES[kind])
     flight.to_bridge(STARTS[kind])
     flight.wait(20.0)
     assert flight.waits_for.startswith(f"a {kind} is not commanded by missions")
@@ -236,8 +246,11 @@ def test_a_rover_changes_its_battery_at_a_base() -> None:
 # -- a plane that needs a runway ---------------------------------------------------------
 
 
-def test_a_plane_takes_off_the_way_it_stands_and_lands_along_its_runway() -> None:
-    flight = started(VehicleKind.PLANE)
+@PLANES
+def test_a_plane_takes_off_the_way_it_stands_and_lands_along_its_runway(
+    flavour: FirmwareModelName,
+) -> None:
+    flight = started(VehicleKind.PLANE, flavour)
     low_m = [at for at in flight.track_enu_m if 0.0 < at[2] < 29.0]
     assert all(at[1] == pytest.approx(HOME_M[1]) and at[0] > HOME_M[0] for at in low_m)
     flight.to_bridge(GoTo(1, FAR[VehicleKind.PLANE]))
@@ -252,8 +265,11 @@ def test_a_plane_takes_off_the_way_it_stands_and_lands_along_its_runway() -> Non
     assert before[0] < HOME_M[0]
 
 
-def test_the_landing_stands_on_a_plane_whatever_becomes_of_its_agent() -> None:
-    flight = started(VehicleKind.PLANE)
+@PLANES
+def test_the_landing_stands_on_a_plane_whatever_becomes_of_its_agent(
+    flavour: FirmwareModelName,
+) -> None:
+    flight = started(VehicleKind.PLANE, flavour)
     flight.to_bridge(GoTo(1, FAR[VehicleKind.PLANE]))
     flight.run_until(Arrived(1))
     pilot = flight.vehicle.pilot
@@ -263,20 +279,116 @@ def test_the_landing_stands_on_a_plane_whatever_becomes_of_its_agent() -> None:
     assert away_m(flight, HOME_M) <= 0.1
 
 
-def test_a_plane_that_would_circle_over_home_for_good_is_not_started() -> None:
-    flight = joined(VehicleKind.PLANE)
+@pytest.mark.parametrize(
+    ("flavour", "name", "lands"), [(PX4, "RTL_TYPE", 1.0), (ARDUPILOT, "RTL_AUTOLAND", 2.0)]
+)
+def test_a_plane_that_would_circle_over_home_for_good_is_not_started(
+    flavour: FirmwareModelName, name: str, lands: float
+) -> None:
+    flight = joined(VehicleKind.PLANE, flavour)
     flight.wait(5.0)
     table = flight.vehicle.pilot.parameters
-    table.write("RTL_TYPE", 0.0)
+    table.write(name, 0.0)
     flight.to_bridge(STARTS[VehicleKind.PLANE])
     flight.wait(20.0)
-    table.write("RTL_TYPE", 3.0)
+    table.write(name, 3.0)
     flight.wait(20.0)
-    said = "RTL_TYPE is 3, so it may circle over home for good: set RTL_TYPE 1"
+    said = f"{name} is 3, so it may circle over home for good: set {name} {lands:g}"
     assert flight.waits_for == said
     assert not flight.vehicle.pilot.armed
-    table.write("RTL_TYPE", 1.0)
+    table.write(name, lands)
     flight.run_until(VehicleReady())
+
+
+# -- ArduPlane: take-off and landing are items of a mission, flown in AUTO ----------------
+
+
+def taking_off(seconds: float) -> JoinedFlight:
+    """So long after its motors were started."""
+    flight = joined(VehicleKind.PLANE)
+    flight.to_bridge(STARTS[VehicleKind.PLANE])
+    flight.run_until(MotorsRun(ours=True))
+    flight.wait(seconds)
+    pilot = flight.vehicle.pilot
+    assert pilot.mode is FlightMode.AUTO
+    assert 0.0 < pilot.position_enu_m(flight.now_s)[2] < 30.0
+    return flight
+
+
+def test_its_pilots_auto_is_told_from_ours() -> None:
+    flight = started(VehicleKind.PLANE)
+    flight.to_bridge(GoTo(1, FAR[VehicleKind.PLANE]))
+    flight.wait(3.0)
+    flight.vehicle.pilot.set_mode(FlightMode.AUTO, flight.now_s)
+    flight.run_until(HandedOver("its pilot switched it to AUTO (after its take-off)"))
+
+
+def test_its_pilots_landing_is_told_from_ours() -> None:
+    flight = started(VehicleKind.PLANE)
+    pilot = flight.vehicle.pilot
+    pilot.run.set_current(3, flight.now_s)
+    pilot.set_mode(FlightMode.AUTO, flight.now_s)
+    told = "its pilot or a failsafe switched it to AUTO (landing)"
+    flight.run_until(HandedOver(told))
+
+
+def test_a_pilot_who_breaks_its_landing_off_has_it() -> None:
+    flight = started(VehicleKind.PLANE)
+    flight.to_bridge(GoTo(1, FAR[VehicleKind.PLANE]))
+    flight.run_until(Arrived(1))
+    flight.to_bridge(Return("done"))
+    flight.run_until(ReturnBegun())
+    flight.wait(5.0)
+    flight.vehicle.pilot.run.set_current(2, flight.now_s)
+    flight.run_until(HandedOver("its pilot switched it to AUTO (after its take-off)"))
+
+
+def test_killed_while_it_takes_off_and_started_anew_it_goes_on() -> None:
+    flight = taking_off(5.0)
+    flight.restart_bridge(dead_s=2.0)
+    flight.to_bridge(replace(STARTS[VehicleKind.PLANE], resume=True))
+    flight.run_until(VehicleReady())
+    flight.to_bridge(GoTo(1, FAR[VehicleKind.PLANE]))
+    flight.run_until(Arrived(1))
+
+
+def test_killed_while_it_takes_off_for_good_it_lands() -> None:
+    flight = taking_off(5.0)
+    flight.restart_bridge(dead_s=300.0)
+    assert not flight.vehicle.pilot.armed
+    assert away_m(flight, HOME_M) <= 0.1
+
+
+def test_killed_while_it_lands_and_started_anew_it_lets_it_land() -> None:
+    flight = started(VehicleKind.PLANE)
+    flight.to_bridge(GoTo(1, FAR[VehicleKind.PLANE]))
+    flight.run_until(Arrived(1))
+    flight.to_bridge(Return("done"))
+    flight.run_until(ReturnBegun())
+    flight.restart_bridge(dead_s=2.0)
+    flight.to_bridge(Return("done", resume=True))
+    flight.run_until(Home())
+    assert away_m(flight, HOME_M) <= 0.1
+
+
+@pytest.mark.parametrize("order", [Hold("wait"), Return("no part in it")])
+def test_it_rises_before_it_is_turned(order: Hold | Return) -> None:
+    flight = taking_off(5.0)
+    flight.to_bridge(order)
+    seen = len(flight.track_enu_m)
+    flight.run_until(Held() if isinstance(order, Hold) else Home())
+    low_m = [at for at in flight.track_enu_m[seen:] if at[2] < 29.0]
+    rising_m = low_m[: next(i for i, at in enumerate(low_m) if at[2] > 28.0)]
+    assert all(at[1] == pytest.approx(HOME_M[1]) for at in rising_m)
+
+
+def test_it_takes_off_again_after_it_has_landed() -> None:
+    flight = started(VehicleKind.PLANE)
+    flight.to_bridge(Return("done"))
+    flight.run_until(Home())
+    flight.to_bridge(STARTS[VehicleKind.PLANE])
+    flight.run_until(VehicleReady())
+    assert flight.vehicle.pilot.mode is FlightMode.GUIDED
 
 
 # -- a fleet of all kinds ---------------------------------------------------------------

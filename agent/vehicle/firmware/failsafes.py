@@ -33,6 +33,7 @@ QUADPLANE_NAMES: Names = (
     ("MAV_GCS_SYSID_HI",),
     ("BATT_FS_LOW_ACT",),
 )
+ARDUPLANE_NAMES: Names = (*(name for name in QUADPLANE_NAMES if name != ("Q_RTL_MODE",)),)
 PX4_NAMES: Names = (
     ("NAV_DLL_ACT",),
     ("COM_DLL_EXCEPT",),
@@ -40,6 +41,8 @@ PX4_NAMES: Names = (
     ("COM_LOW_BAT_ACT",),
 )
 
+_Asked = tuple[str, tuple[int, ...], str]
+"""A parameter, which of its values are good, and what to set else."""
 _LANDS_ARDUCOPTER = (5, 7)
 _HOLDS, _RETURNS, _LANDS = 1, 2, 3
 """Values of NAV_DLL_ACT."""
@@ -95,11 +98,20 @@ def _deaf(
 
 def quadplane_failsafes(values: Mapping[str, float], own_system_id: int) -> Failsafes:
     """Those of a QuadPlane: it comes home and lands there, or circles until it is empty."""
+    return _winged(values, own_system_id, ("Q_RTL_MODE", (1, 2, 3), "set Q_RTL_MODE 1"))
+
+
+def arduplane_failsafes(values: Mapping[str, float], own_system_id: int) -> Failsafes:
+    """Those of a plane on a runway; that its return lands it is seen to before (RTL_AUTOLAND)."""
+    return _winged(values, own_system_id)
+
+
+def _winged(values: Mapping[str, float], own_system_id: int, *more: _Asked) -> Failsafes:
     battery = _battery("BATT_FS_LOW_ACT", values)
-    asked = (
+    asked: tuple[_Asked, ...] = (
         ("FS_GCS_ENABL", (1, 2), "set FS_GCS_ENABL 1"),
         ("FS_LONG_ACTN", (1,), "set FS_LONG_ACTN 1"),
-        ("Q_RTL_MODE", (1, 2, 3), "set Q_RTL_MODE 1"),
+        *more,
     )
     for name, good, remedy in asked:
         value = values.get(name)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from types import MappingProxyType
 from typing import ClassVar
 
+from agent.core.interface import Runway
 from agent.vehicle.commands import result_text
 from agent.vehicle.firmware.failsafes import Failsafes
 from agent.vehicle.firmware.fences import POLYGONS, FenceSetup
@@ -23,10 +24,13 @@ from agent.vehicle.messages import (
     CommandLong,
     Heartbeat,
     Inbound,
+    MissionCurrent,
+    MissionItem,
     ParameterValue,
 )
 from agent.vehicle.parameter_override import OverrideSpec
 from agent.vehicle.state import VehicleState
+from swarm.model.frames import Origin
 from swarm.model.vehicles import TRAITS, VehicleKind, VehicleTraits
 
 Mode = tuple[int, ...]
@@ -76,6 +80,8 @@ class Firmware(ABC):
     """Whether it is known how to command it by missions."""
     landing_names: ClassVar[tuple[str, ...]] = ()
     """Parameters that say how it lands along a runway."""
+    first_item: ClassVar[int | None] = None
+    """Item of the mission of what needs a runway with which it takes off; None: by none."""
     stops_within_m: ClassVar[float] = 0.0
     """How far from a target it may stop for good; 0: at it."""
     disarms_itself: ClassVar[bool] = True
@@ -159,6 +165,26 @@ class Firmware(ABC):
         """Whether the mode is one that the vehicle enters by itself to take off on our order."""
         return self.mode(custom_mode) == self.takeoff_mode
 
+    def has_taken_off(self, custom_mode: int) -> bool:
+        """Whether the take-off is over, and it waits in that mode to be told another one."""
+        del custom_mode
+        return False
+
+    def must_rise(self, custom_mode: int) -> bool:
+        """Whether it takes off in that mode, and is better left alone until that is over."""
+        del custom_mode
+        return False
+
+    def flies_items(self, custom_mode: int) -> bool:
+        """Whether that mode, as a heartbeat tells it, says little without the item flown."""
+        del custom_mode
+        return False
+
+    def told_mode(self, custom_mode: int, item: MissionCurrent | None) -> int:
+        """The mode as a heartbeat tells it, and the item that is flown then, in one number."""
+        del item
+        return custom_mode
+
     def is_mission(self, custom_mode: int) -> bool:
         """Whether the vehicle flies the mission that stands on it in that mode."""
         return self.mode(custom_mode) == self.mission_mode
@@ -237,6 +263,20 @@ class Firmware(ABC):
         """
         del values
         return f"a {self.kind} lands upright"
+
+    def runway_mission(
+        self, landing: RunwayLanding, runway: Runway, up_m: float, origin: Origin
+    ) -> tuple[MissionItem, ...]:
+        """What is to stand on it before it takes off.
+
+        Args:
+            landing: how it comes down.
+            runway: where.
+            up_m: height at which its take-off ends [m; mission origin].
+            origin: zero of the mission's local frame.
+        """
+        del up_m
+        return landing.items(runway, origin)
 
     # What it is told.
 

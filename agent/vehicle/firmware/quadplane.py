@@ -5,8 +5,8 @@ as wide as WP_LOITER_RAD; where Q_GUIDED_MODE is 1 it hovers over them, having p
 It comes home by QRTL, which lands it upright where it took off, and disarms it. Planes tell their
 kind by Q_MAV_TYPE: where that is 0 they say that they are planes like any other, and are not flown.
 
-Leaves out: planes that need a runway, landings elsewhere than at home, lines, zones (a scenario
-with such is refused) and commanding by missions.
+Leaves out: planes that need a runway (agent.vehicle.firmware.arduplane), landings elsewhere than at
+home, lines, zones (a scenario with such is refused) and commanding by missions.
 
 Sources: https://ardupilot.org/plane/docs/quadplane-flying.html; GCS_MAVLink_Plane.cpp,
 mode_guided.cpp, mode_qrtl.cpp, quadplane.cpp and Parameters.cpp of ArduPilot 4.8.
@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from types import MappingProxyType
+from typing import ClassVar
 
 from agent.vehicle.firmware.ardupilot import ArduPilot
 from agent.vehicle.firmware.failsafes import QUADPLANE_NAMES, Failsafes, quadplane_failsafes
@@ -25,7 +26,7 @@ from agent.vehicle.firmware.kinematics import (
     Kinematics,
     quadplane_kinematics,
 )
-from agent.vehicle.firmware.profile import UNCHANGED
+from agent.vehicle.firmware.profile import UNCHANGED, Mode
 from agent.vehicle.messages import CommandLong
 from swarm.model.vehicles import VehicleKind
 
@@ -35,13 +36,9 @@ _CMD_DO_CHANGE_SPEED = 178
 _AIRSPEED = 0.0
 
 
-class QuadPlane(ArduPilot):
-    """The firmware of ArduPilot's planes, of those with rotors."""
+class WingedArduPilot(ArduPilot):
+    """What ArduPlane does whatever it flies."""
 
-    name = "QuadPlane"
-    kind = VehicleKind.QUADPLANE
-    vehicle_types = frozenset({19, 20, 21, 22, 23, 24, 25})
-    """MAV_TYPE of tailsitters, tiltrotors, fixed rotors and tilted wings."""
     takes_missions = False
     mode_names = MappingProxyType(
         {
@@ -73,20 +70,12 @@ class QuadPlane(ArduPilot):
             _AUTOLAND: "AUTOLAND",
         }
     )
-    commanded_mode = _GUIDED
-    mission_mode = _AUTO
-    return_mode = _QRTL
-    land_mode = _QLAND
-    returning_modes = frozenset({_RTL, _QLAND, _QRTL, _AUTOLAND})
+    commanded_mode: ClassVar[Mode] = _GUIDED
+    mission_mode: ClassVar[Mode] = _AUTO
     speed_parameters = ()
     """AIRSPEED_CRUISE may lie outside of what the plane can fly; the command is refused then."""
-    failsafe_names = QUADPLANE_NAMES
     limit_parameters = QUADPLANE_LIMITS
     fence_names = ARDUCOPTER_FENCE_NAMES
-
-    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
-        """It listens to the heartbeats of certain system ids only."""
-        return quadplane_failsafes(values, own_system_id)
 
     def kinematics(self, values: Mapping[str, float]) -> Kinematics:
         """By its turns."""
@@ -100,3 +89,20 @@ class QuadPlane(ArduPilot):
         """Speed through the air; a ground speed would be the least one that it keeps."""
         params = (_AIRSPEED, speed_m_s, UNCHANGED, 0.0, 0.0, 0.0, 0.0)
         return CommandLong(_CMD_DO_CHANGE_SPEED, params)
+
+
+class QuadPlane(WingedArduPilot):
+    """The firmware of ArduPilot's planes, of those with rotors."""
+
+    name = "QuadPlane"
+    kind = VehicleKind.QUADPLANE
+    vehicle_types = frozenset({19, 20, 21, 22, 23, 24, 25})
+    """MAV_TYPE of tailsitters, tiltrotors, fixed rotors and tilted wings."""
+    return_mode = _QRTL
+    land_mode = _QLAND
+    returning_modes = frozenset({_RTL, _QLAND, _QRTL, _AUTOLAND})
+    failsafe_names = QUADPLANE_NAMES
+
+    def failsafes(self, values: Mapping[str, float], own_system_id: int) -> Failsafes:
+        """It listens to the heartbeats of certain system ids only."""
+        return quadplane_failsafes(values, own_system_id)

@@ -26,7 +26,12 @@ class FirmwareModelName(StrEnum):
 SIMULATED: Final[Mapping[FirmwareModelName, frozenset[VehicleKind]]] = MappingProxyType(
     {
         FirmwareModelName.ARDUPILOT: frozenset(
-            {VehicleKind.COPTER, VehicleKind.ROVER, VehicleKind.QUADPLANE}
+            {
+                VehicleKind.COPTER,
+                VehicleKind.ROVER,
+                VehicleKind.QUADPLANE,
+                VehicleKind.PLANE,
+            }
         ),
         FirmwareModelName.PX4: frozenset({VehicleKind.COPTER, VehicleKind.PLANE}),
     }
@@ -62,6 +67,7 @@ def firmware_model(
         raise ValueError(f"no {vehicle} is simulated with {name}")
     # Imported late: the command line knows the names without the dialect.
     from sim.autopilot.firmware.ardupilot import ArduCopterModel
+    from sim.autopilot.firmware.arduplane import ArduPlaneModel
     from sim.autopilot.firmware.ardurover import ArduRoverModel
     from sim.autopilot.firmware.px4 import Px4Model
     from sim.autopilot.firmware.px4_plane import Px4PlaneModel
@@ -72,5 +78,5 @@ def firmware_model(
     if vehicle is VehicleKind.QUADPLANE:
         return QuadPlaneModel()
     if vehicle is VehicleKind.PLANE:
-        return Px4PlaneModel()
+        return Px4PlaneModel() if name == FirmwareModelName.PX4 else ArduPlaneModel()
     return Px4Model() if name == FirmwareModelName.PX4 else ArduCopterModel()

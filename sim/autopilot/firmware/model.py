@@ -113,6 +113,9 @@ class MissionBehaviour:
     of interest are told on, too, and acknowledged to who commands one."""
     lands_on_runways: bool = False
     """Whether it knows where a landing begins, and a circle on which to come down for it."""
+    takes_off_by_itself: bool = False
+    """Whether the mission mode leaves the ground, as soon as the motors run, where the mission
+    begins with a take-off."""
     forgets_mode: bool = False
     """Whether the mode becomes another one at the end, or at an item that returns home."""
 
@@ -275,6 +278,11 @@ class FirmwareModel(ABC):
 
     def landing_enu_m(self, pilot: Pilot) -> RunwayPlaces | None:
         """Where its return mode lands along a runway [m]; None: it does not."""
+        del pilot
+        return None
+
+    def lands_by_mission(self, pilot: Pilot) -> int | None:
+        """Number of the item with which its return mode goes on in the mission mode, if so."""
         del pilot
         return None
 
