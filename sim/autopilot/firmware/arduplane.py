@@ -87,7 +87,9 @@ class ArduPlaneModel(QuadPlaneModel):
         return (*kept, ParameterEntry("RTL_AUTOLAND", 2.0, _INT8, least=0.0))
 
     def landing_enu_m(self, pilot: Pilot) -> RunwayPlaces | None:
-        """That of the mission which stands on it."""
+        """That of the mission which stands on it, in AUTO alone."""
+        if pilot.mode is not FlightMode.AUTO:
+            return None
         return runway_places_enu_m(pilot.store.items, pilot.config.origin, pilot.flight.home_enu_m)
 
     def lands_by_mission(self, pilot: Pilot) -> int | None:

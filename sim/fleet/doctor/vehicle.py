@@ -183,7 +183,7 @@ class VehicleListener:
             return [self._not_heard(name)]
         flavour = firmware_of(heartbeat)
         if flavour is None:
-            remedy = "fly ArduCopter, Rover, a QuadPlane, or PX4 on a multicopter"
+            remedy = "fly ArduCopter, Rover, ArduPlane, or PX4 on a multicopter or plane"
             return [fails(name, unsupported(heartbeat), remedy)]
         return [
             self._vehicle(name, heartbeat, flavour),
@@ -303,8 +303,11 @@ def _failsafes(name: str, reading: FailsafeReading) -> CheckFinding:
 
 def _kind(name: str, flavour: Firmware) -> list[CheckFinding]:
     """What it is, and what it is not flown with; nothing of a copter."""
-    limits = flavour.traits.limits
-    return [fine(f"{name} kind", f"a {flavour.kind}: {limits}")] if limits else []
+    limits, what = flavour.traits.limits, f"{name} kind"
+    told = f"a {flavour.kind}: {limits}"
+    if flavour.caution is not None:
+        return [warns(what, f"{told}; {flavour.caution}", "try it where little is lost")]
+    return [fine(what, told)] if limits else []
 
 
 def _limits(name: str, limits: Kinematics) -> CheckFinding:

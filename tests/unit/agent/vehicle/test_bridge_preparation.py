@@ -211,7 +211,7 @@ def test_other_component_of_the_right_system_is_not_the_autopilot(fake: type[Fak
     assert {m.get_type() for m in copter.heard} == {"HEARTBEAT"}
 
 
-@pytest.mark.parametrize(("mav_type", "autopilot"), [(1, 3), (10, 12), (22, 12), (2, 18)])
+@pytest.mark.parametrize(("mav_type", "autopilot"), [(12, 3), (10, 12), (22, 12), (2, 18)])
 def test_unsupported_vehicle_is_named_and_left_alone(
     fake: type[FakeCopter], mav_type: int, autopilot: int
 ) -> None:

@@ -6,18 +6,23 @@ import math
 
 import pytest
 
+from agent.core.interface import Prepare, Runway
 from agent.vehicle.firmware import firmware_of, unsupported
 from agent.vehicle.firmware.ardupilot import ArduCopter
+from agent.vehicle.firmware.arduplane import ArduPlane
 from agent.vehicle.firmware.ardurover import ArduRover
 from agent.vehicle.firmware.px4 import Px4Copter
 from agent.vehicle.firmware.px4_plane import Px4Plane
 from agent.vehicle.firmware.quadplane import QuadPlane
 from agent.vehicle.landing_pattern import RunwayLanding
-from agent.vehicle.messages import Heartbeat
+from agent.vehicle.messages import AltitudeFrame, Heartbeat, MissionCurrent
+from agent.vehicle.preflight import wrong_kind
+from swarm.model.frames import Origin
 from swarm.model.vehicles import TRAITS, VehicleKind
 
 ARDUPILOT, PX4 = 3, 12
-ROVER, PLANE = ArduRover(), QuadPlane()
+ROVER, PLANE, RUNWAY_PLANE = ArduRover(), QuadPlane(), ArduPlane()
+LANDS = {"Q_ENABLE": 0.0, "RTL_AUTOLAND": 2.0, "WP_LOITER_RAD": 60.0}
 FINE = {
     "FS_GCS_ENABL": 1.0,
     "FS_LONG_ACTN": 1.0,
@@ -48,7 +53,7 @@ def heartbeat(vehicle_type: int, autopilot: int = ARDUPILOT) -> Heartbeat:
         (20, QuadPlane),
         (21, QuadPlane),
         (22, QuadPlane),
-        (1, None),
+        (1, ArduPlane),
         (12, None),
     ],
 )
@@ -66,7 +71,16 @@ def test_px4_is_told_by_its_kind_of_vehicle(vehicle_type: int, kind: type | None
 
 
 def test_a_plane_that_tells_no_rotors_is_told_what_to_set() -> None:
-    assert "set Q_MAV_TYPE 22" in unsupported(heartbeat(1))
+    told = wrong_kind(Prepare((0.0, 0.0, 30.0), 20.0, vehicle=VehicleKind.QUADPLANE), RUNWAY_PLANE)
+    assert told == (
+        "the vehicle is a plane, the scenario has a quadplane (if it has rotors, set Q_MAV_TYPE 22)"
+    )
+    landing = RUNWAY_PLANE.runway_landing({**LANDS, "Q_ENABLE": 1.0})
+    assert isinstance(landing, str)
+    assert "set Q_MAV_TYPE 22" in landing
+
+
+def test_what_nobody_flies_is_told() -> None:
     assert unsupported(heartbeat(12)) == (
         "autopilot 3 on vehicle type 12 (MAV_AUTOPILOT, MAV_TYPE) is not supported"
     )
@@ -142,6 +156,87 @@ def test_a_px4_plane_turns_on_its_circle_and_is_no_faster_than_it_can() -> None:
     assert 12.0 / acceleration_m_s2 == pytest.approx(80.0 / 12.0)
     assert limits.speed is not None
     assert limits.speed.value == 20.0
+
+
+def test_an_arduplane_lands_where_its_return_leads_to_that() -> None:
+    assert RUNWAY_PLANE.runway_landing(LANDS) == RunwayLanding(60.0, math.radians(5.0))
+    assert RUNWAY_PLANE.runway_landing({**LANDS, "RTL_AUTOLAND": 1.0, "WP_LOITER_RAD": -80.0}) == (
+        RunwayLanding(80.0, math.radians(5.0))
+    )
+
+
+@pytest.mark.parametrize(
+    ("values", "says"),
+    [
+        ({}, "RTL_AUTOLAND is not known, so it may circle over home for good: set RTL_AUTOLAND 2"),
+        ({"RTL_AUTOLAND": 0.0}, "RTL_AUTOLAND is 0, so it may circle"),
+        ({"RTL_AUTOLAND": 3.0}, "RTL_AUTOLAND is 3, so it may circle"),
+        ({"RTL_AUTOLAND": 4.0}, "RTL_AUTOLAND is 4, so it may circle"),
+        ({"RTL_AUTOLAND": 2.0}, "WP_LOITER_RAD is not known, or 0"),
+    ],
+)
+def test_an_arduplane_of_which_it_is_not_known_how_it_lands_has_no_landing(
+    values: dict[str, float], says: str
+) -> None:
+    told = RUNWAY_PLANE.runway_landing(values)
+    assert isinstance(told, str)
+    assert says in told
+
+
+def test_an_arduplane_takes_off_circles_and_lands_by_one_mission() -> None:
+    origin, runway = Origin(48.2, 7.5, 170.0), Runway((10.0, 20.0, 2.0), 0.0)
+    landing = RunwayLanding(60.0, math.radians(5.0))
+    items = RUNWAY_PLANE.runway_mission(landing, runway, 40.0, origin)
+    assert [item.command for item in items] == [16, 22, 19, 189, 31, 16, 21]
+    assert [item.seq for item in items] == list(range(7))
+    home, take_off, waits, _, circle, _, ground = items
+    assert (take_off.lat_deg, take_off.lon_deg) == (0.0, 0.0)  # straight ahead
+    assert [take_off.alt_m, waits.alt_m] == pytest.approx([210.0, 210.0])
+    assert {item.frame for item in items if item.command != 189} == {AltitudeFrame.MEAN_SEA_LEVEL}
+    # As ArduPlane gives them back: of a circle and a landing it keeps no more.
+    assert take_off.params == (15.0, 0.0, 0.0, 0.0)
+    assert waits.params == (60.0, 0.0, 1.0, 0.0)
+    assert circle.params == (0.0, 60.0, 0.0, 1.0)
+    assert ground.params == (0.0, 0.0, 0.0, 1.0)
+    assert (home.lat_deg, home.lon_deg) == (ground.lat_deg, ground.lon_deg)
+
+
+@pytest.mark.parametrize(
+    ("item", "name"),
+    [
+        (MissionCurrent(0, 6), "AUTO (taking off)"),
+        (MissionCurrent(1, 6), "AUTO (taking off)"),
+        (MissionCurrent(2, 6), "AUTO (after its take-off)"),
+        (MissionCurrent(3, 6), "AUTO (landing)"),
+        (MissionCurrent(6), "AUTO (landing)"),
+        (MissionCurrent(6, 9), "AUTO"),
+        (None, "AUTO"),
+    ],
+)
+def test_auto_is_told_by_what_it_flies_of_which_mission(
+    item: MissionCurrent | None, name: str
+) -> None:
+    told = RUNWAY_PLANE.told_mode(10, item)
+    assert RUNWAY_PLANE.mode_name(told) == name
+    assert RUNWAY_PLANE.is_returning(told) is (name == "AUTO (landing)")
+    assert RUNWAY_PLANE.is_taking_off(told) is (item is None or "off" in name)
+    assert RUNWAY_PLANE.has_taken_off(told) is ("after" in name)
+    assert RUNWAY_PLANE.must_rise(told) is ("taking" in name)
+    assert not RUNWAY_PLANE.is_commanded(told)
+
+
+def test_other_modes_are_told_by_their_numbers_whatever_bits_stand_above() -> None:
+    assert RUNWAY_PLANE.told_mode(15, MissionCurrent(3, 6)) == 15
+    assert RUNWAY_PLANE.told_mode(11 | 3 << 24, None) == 11
+    assert RUNWAY_PLANE.is_commanded(15)
+    assert RUNWAY_PLANE.is_returning(11)
+
+
+def test_an_arduplane_comes_home_where_all_is_set() -> None:
+    told = RUNWAY_PLANE.failsafes({k: v for k, v in FINE.items() if k != "Q_RTL_MODE"}, 255)
+    assert told.comes_home
+    assert told.agent_lost == "returns after 5 s"
+    assert RUNWAY_PLANE.failsafes({**FINE, "FS_LONG_ACTN": 0.0}, 255).remedy == "set FS_LONG_ACTN 1"
 
 
 # -- without an agent ------------------------------------------------------------------

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
+from agent.core.interface import Runway
+from agent.vehicle.firmware.arduplane import ArduPlane
+from agent.vehicle.landing_pattern import RunwayLanding
 from sim.autopilot.config import VehicleConfig, fleet_of
 from sim.autopilot.firmware import SIMULATED, FirmwareModelName, check_simulated, firmware_model
 from sim.autopilot.flight import FlightMode
+from sim.autopilot.mission_item import StoredMissionItem
 from swarm.model.vehicles import VehicleKind
 from swarm.runtime.errors import InputError
 from swarm.scenario import load_scenario
@@ -17,7 +22,7 @@ from swarm.scenario.files import resolve_scenario
 from tests.support.ground_station import GroundStation, ground_station, only
 
 ROVER, PLANE = VehicleKind.ROVER, VehicleKind.QUADPLANE
-GUIDED, HOLD, RTL, QRTL = 15, 4, 11, 21
+AUTO, GUIDED, HOLD, RTL, QRTL = 10, 15, 4, 11, 21
 EXTENDED, HEARTBEAT = mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, mavlink.MAVLINK_MSG_ID_HEARTBEAT
 ACCEPTED, UNSUPPORTED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_UNSUPPORTED
 
@@ -147,8 +152,7 @@ def test_a_plane_on_a_strip_stands_in_the_direction_of_its_landing() -> None:
 def test_each_kind_is_simulated_with_some_firmware() -> None:
     assert SIMULATED[FirmwareModelName.PX4] == {VehicleKind.COPTER, VehicleKind.PLANE}
     assert frozenset().union(*SIMULATED.values()) == frozenset(VehicleKind)
-    with pytest.raises(InputError, match="no plane is simulated with that firmware; take px4"):
-        check_simulated(FirmwareModelName.ARDUPILOT, [VehicleKind.PLANE], "--flavour")
+    assert SIMULATED[FirmwareModelName.ARDUPILOT] == frozenset(VehicleKind)
     with pytest.raises(ValueError, match="no rover is simulated with px4"):
         firmware_model(FirmwareModelName.PX4, ROVER)
     with pytest.raises(InputError, match="--flavour: px4: no quadplane is simulated"):
@@ -211,3 +215,74 @@ def test_it_lands_where_it_is_round_a_circle() -> None:
     lies_enu_m = pilot.position_enu_m(plane.now_s)
     assert lies_enu_m[2] == pytest.approx(0.0, abs=1e-6)
     assert math.dist(here_enu_m[:2], lies_enu_m[:2]) <= 160.0
+
+
+# -- ArduPlane on a runway ----------------------------------------------------------------
+
+
+def arduplane() -> GroundStation:
+    """With its mission on it, in GUIDED."""
+    flavour = firmware_model(FirmwareModelName.ARDUPILOT, VehicleKind.PLANE)
+    plane = ground_station(flavour, vehicle=VehicleKind.PLANE, circle_m=80.0, cruise_m_s=12.0)
+    plane.wait(12.0)
+    runway, landing = Runway((0.0, 0.0, 0.0), 0.0), RunwayLanding(80.0, math.radians(5.0))
+    plane.vehicle.pilot.store.items = tuple(
+        StoredMissionItem(
+            mavlink.MAV_FRAME_GLOBAL,
+            item.command,
+            item.params,
+            round(item.lat_deg * 1e7),
+            round(item.lon_deg * 1e7),
+            item.alt_m,
+        )
+        for item in ArduPlane().runway_mission(landing, runway, 40.0, plane.vehicle.config.origin)
+    )
+    assert plane.set_mode(GUIDED) == ACCEPTED
+    return plane
+
+
+def items_told(plane: GroundStation, duration_s: float) -> list[int]:
+    """The items that it flew meanwhile, looked at each second."""
+    told = []
+    for _ in range(round(duration_s)):
+        plane.wait(1.0)
+        told.append(plane.vehicle.pilot.run.told)
+    return [seq for seq, _ in itertools.groupby(told)]
+
+
+def test_arduplane_takes_off_waits_and_lands_by_its_mission() -> None:
+    plane = arduplane()
+    pilot = plane.vehicle.pilot
+    assert plane.arm() == ACCEPTED
+    plane.wait(5.0)
+    assert pilot.flight.on_ground  # GUIDED does not start it
+    assert plane.set_mode(AUTO) == ACCEPTED
+    assert items_told(plane, 400.0) == [1, 2, 4, 6, 0]
+    assert not pilot.armed
+    assert math.dist(pilot.position_enu_m(plane.now_s), (0.0, 0.0, 0.0)) <= 0.1
+
+
+@pytest.mark.parametrize(("autoland", "mode"), [(0.0, FlightMode.RTL), (2.0, FlightMode.AUTO)])
+def test_its_return_leads_to_the_landing_where_it_is_set_so(
+    autoland: float, mode: FlightMode
+) -> None:
+    plane = arduplane()
+    pilot = plane.vehicle.pilot
+    pilot.parameters.write("RTL_AUTOLAND", autoland)
+    assert plane.arm() == ACCEPTED
+    assert plane.set_mode(AUTO) == ACCEPTED
+    plane.wait(30.0)
+    assert plane.set_mode(RTL) == ACCEPTED
+    plane.wait(1.1)
+    assert pilot.mode is mode
+    plane.wait(400.0)
+    assert pilot.armed is (mode is FlightMode.RTL)
+
+
+def test_arduplane_has_the_parameters_of_planes() -> None:
+    config = VehicleConfig(1, vehicle=VehicleKind.PLANE, circle_m=80.0)
+    flavour = firmware_model(FirmwareModelName.ARDUPILOT, VehicleKind.PLANE)
+    names = [each.name for each in flavour.parameters(config)]
+    assert len(names) == len(set(names))
+    assert set(ArduPlane.landing_names) <= set(names)
+    assert not [name for name in names if name.startswith("Q_") and name != "Q_ENABLE"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from dataclasses import replace
 from itertools import pairwise
@@ -116,6 +117,27 @@ def test_ardupilot_has_a_program_and_a_model_for_each_kind_of_vehicle() -> None:
     assert "FRAME_CLASS" not in parameters_of(made[1])
     plane = parameters_of(made[2])
     assert (plane["Q_ENABLE"], plane["Q_MAV_TYPE"], plane["WP_LOITER_RAD"]) == ("1", "22", "80")
+
+
+def test_ardupilots_plane_stands_in_the_direction_of_its_landing_and_returns_to_that() -> None:
+    plane = replace(
+        uav("u0"),
+        vehicle=VehicleKind.PLANE,
+        speed_m_s=12.0,
+        acceleration_m_s2=turning_acceleration_m_s2(12.0, 80.0),
+        landing_heading_rad=math.radians(275.0),
+    )
+    fleet = replace(mission([plane], [task("t0", 1.0)]), origin=ORIGIN)
+    others = {VehicleKind.PLANE: Path("/opt/arduplane")}
+    firmware = SitlFirmware(FirmwareKind.ARDUPILOT, Path("/opt/x"), Path("/tmp"), others=others)
+    made = firmware.processes(fleet, 1.0)["u0"]
+
+    assert made.command[0] == "/opt/arduplane"
+    assert value(made, "--model") == "plane"
+    assert value(made, "--home").split(",")[-1] == "275"
+    told = parameters_of(made)
+    assert (told["RTL_AUTOLAND"], told["WP_LOITER_RAD"]) == ("2", "80")
+    assert "Q_ENABLE" not in told
 
 
 def test_px4_has_a_model_for_each_kind_of_vehicle_and_one_program() -> None:
