@@ -422,11 +422,23 @@ def test_copter_rover_and_plane_share_a_mission(
     assert did["plane"] == ["herd"]
 
 
+@pytest.mark.parametrize(
+    ("kind", "variables", "simulated", "speedup"),
+    [
+        (FirmwareKind.PX4, ["SWARM_SITL_PX4"], "sim-px4", 1.0),
+        (FirmwareKind.ARDUPILOT, ["SWARM_SITL_ARDUCOPTER", "SWARM_SITL_PLANE"], "sim", 2.0),
+    ],
+)
 def test_copter_and_plane_share_a_mission_and_the_plane_lands_on_its_strip(
-    tmp_path: Path, record_property: Callable[[str, object], None]
+    kind: FirmwareKind,
+    variables: list[str],
+    simulated: str,
+    speedup: float,
+    tmp_path: Path,
+    record_property: Callable[[str, object], None],
 ) -> None:
-    real = bool(os.environ.get(FirmwareKind.PX4.variable))
+    real = all(os.environ.get(variable) for variable in variables)
     record_property("flown", "real" if real else "simulated")
-    autopilot, speedup = ("px4", 1.0) if real else ("sim-px4", pace(10.0))
+    autopilot, speedup = (str(kind), speedup) if real else (simulated, pace(10.0))
     did = flown(resolve_scenario("airstrip"), autopilot, speedup, tmp_path)
     assert did == {"copter": ["roof"], "plane": ["field"]}
