@@ -4,9 +4,7 @@ In a mission with a separation all orders that move the vehicle come through her
 where the vehicle is, until the keepers of the air that its way leads through have granted it (see
 swarm.separation): in the UAV's layer, or in another one nearby if that is taken. The rest of the
 core knows nothing of other layers: it goes on in the one of the brief, and heights are shifted on
-their way to the vehicle and back. Whatever happens, the UAV may stay where it is.
-
-In any other mission orders pass as they are.
+their way to the vehicle and back. Whatever happens, the UAV may stay where it is. In other missions orders pass as they are.
 """
 
 from __future__ import annotations
@@ -16,7 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
-from agent.core.fleet_air import GIVES_UP_S, STOP_LEG, FleetAir, Wish
+from agent.core.fleet_air import ASIDE_PATIENCE, GIVES_UP_S, STOP_LEG, FleetAir, Wish
 from agent.core.interface import (
     Action,
     Arrived,
@@ -49,8 +47,6 @@ from swarm.separation.shifted import hovering, landed, left_of_way, lifted, nomi
 
 _BY_GRANT = GoTo | Return | Prepare
 """Orders that may have to wait for a way."""
-_ASIDE_PATIENCE = 4.0
-"""How long it waits for its way aside, in intervals at which it asks anew."""
 
 
 class Airway:
@@ -356,7 +352,7 @@ class Airway:
         if wish is not None and self._aloft and self._fleet.must_land(wish, end_s, self._retry_s):
             return self._come_down(wish)
         if self._aside is not None:
-            if now_s - self._aside.since_s > _ASIDE_PATIENCE * self._retry_s:
+            if now_s - self._aside.since_s > ASIDE_PATIENCE * self._retry_s:
                 self._aside, self._way = None, hovering(self._told_way)
             else:
                 self._pursue(air, self._aside, now_s)

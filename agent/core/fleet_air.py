@@ -14,8 +14,8 @@ import numpy as np
 
 from agent.core.interface import GoTo, Prepare, Return
 from agent.core.mission_view import MissionView, Peers
+from agent.core.zone_stay import ZoneStay
 from swarm.allocation.problem import rest_to_rest_s
-from swarm.model import UavId
 from swarm.protocol.calibration import FlightRates
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig, UavSpec
@@ -24,7 +24,7 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, air_of_brief, strength
 from swarm.separation.shifted import length_m, shifted_path
-from swarm.separation.slabs import POSITION_ERROR_M, apart
+from swarm.separation.slabs import apart
 from swarm.separation.straight_pieces import not_flown, thinned
 from swarm.separation.taken_ways import is_home
 
@@ -32,6 +32,8 @@ STOP_LEG = 0
 """Of orders that are the airway's own; those of the core are numbered from 1."""
 ENDLESS_S = 1800.0
 """How long the way of a lost UAV stays taken whose battery has no end, or is changed [s]."""
+ASIDE_PATIENCE = 4.0
+"""How long a UAV waits for its way aside, in intervals at which it asks anew."""
 GIVES_UP_S = 10.0
 """How long a UAV waits for a way to a task before it looks for another task [s]."""
 LEAVES_ZONE_S = 5.0
@@ -120,12 +122,7 @@ class FleetAir:
         self._air: SharedAir | None = None
         self._lost_s: dict[str, float] = {}
         """Who is lost, and since when [s mission time]."""
-        self._in_zone: tuple[tuple[float, float], float] | None = None
-        """Where it waits in a zone, seen from above [m], and since when [s]."""
-        self._out_from: object = None
-        """From which place, by which problem, the way out of a zone was looked for last."""
-        self._out_m: Point | None = None
-        """What was found."""
+        self._zone_stay = ZoneStay(uav, replica, mission_view)
 
     @property
     def shared(self) -> SharedAir | None:
@@ -329,7 +326,7 @@ class FleetAir:
             sortie_end_s: by when it must have landed, its reserve kept [s mission time].
             retry_s: how long it takes until it looks again [s].
         """
-        if self._in_zone_s(wish) > LEAVES_ZONE_S:
+        if self._zone_stay.lasts_s(wish.corners_enu_m[0]) > LEAVES_ZONE_S:
             return True
         waited_s = self._mission_view.now_s - wish.since_s
         late = self._mission_s + retry_s > self.sets_off_by_s(wish, sortie_end_s)
@@ -341,8 +338,8 @@ class FleetAir:
         None as long as it has not waited in one until it looks again, ``retry_s`` [s] later, or if
         it could not go on from outside.
         """
-        out_m, (here, *rest) = self._out_of_zone_m(), wish.corners_enu_m
-        if out_m is None or wish.fixed or not rest or self._in_zone_s(wish) < retry_s:
+        out_m, (here, *rest) = self._zone_stay.out_m(), wish.corners_enu_m
+        if out_m is None or wish.fixed or not rest or self._zone_stay.lasts_s(here) < retry_s:
             return None
         there = self.in_own_layer(out_m)
         is_next = math.dist(there[:2], rest[0][:2]) < _BESIDE_M
@@ -350,33 +347,6 @@ class FleetAir:
             return None
         order, now_s = GoTo(STOP_LEG, there), self._mission_view.now_s
         return Wish(order, now_s, (here, there), out_of_layer=wish.out_of_layer)
-
-    def _in_zone_s(self, wish: Wish) -> float:
-        """How long it has waited in a zone where ``wish`` begins, whatever it wished first [s]."""
-        here, now_s = wish.corners_enu_m[0][:2], self._mission_view.now_s
-        if self._out_of_zone_m() is None:
-            self._in_zone = None
-            return 0.0
-        if self._in_zone is None or self._in_zone[0] != here:
-            self._in_zone = here, now_s
-        return now_s - self._in_zone[1]
-
-    def _out_of_zone_m(self) -> Point | None:
-        """The nearest place outside of a zone that has been drawn over it [m]; None: it is in none.
-
-        Beside one it may seem in by chance.
-        """
-        problem, place = self._mission_view.board.field_problem, self._mission_view.place_enu_m
-        if not zones_in_force(self._replica) or problem is None or problem.network is None:
-            return None
-        if place is None or UavId(self._uav) not in problem.uav_ids:
-            return None
-        if self._out_from != (place, problem):
-            row = problem.uav_ids.index(UavId(self._uav))
-            self._out_from, self._out_m = (place, problem), problem.network.way_out_m(row, place)
-        out_m = self._out_m
-        beside = out_m is None or math.dist(place[:2], out_m[:2]) <= POSITION_ERROR_M
-        return None if beside else out_m
 
     def standing(self) -> tuple[str, BaseStage] | None:
         """Base and stage of who stands there, by its own last word."""
