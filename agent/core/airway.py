@@ -4,7 +4,8 @@ In a mission with a separation all orders that move the vehicle come through her
 where the vehicle is, until the keepers of the air that its way leads through have granted it (see
 swarm.separation): in the UAV's layer, or in another one nearby if that is taken. The rest of the
 core knows nothing of other layers: it goes on in the one of the brief, and heights are shifted on
-their way to the vehicle and back. Whatever happens, the UAV may stay where it is. In other missions orders pass as they are.
+their way to the vehicle and back. Whatever happens, the UAV may stay where it is. In other missions
+orders pass as they are.
 """
 
 from __future__ import annotations
