@@ -118,8 +118,8 @@ class Launcher:
                 vehicles = _there(places)
         await self._start(COORDINATOR, layout.coordinator())
         there = {place.uav: place async for place in vehicles}
-        places = [there[uav.id] for uav in self.mission.uavs if uav.id in there]
-        for group in agent_groups(places, self.options):
+        in_order = [there[uav.id] for uav in self.mission.uavs if uav.id in there]
+        for group in agent_groups(in_order, self.options):
             await self._pace.room()
             uavs = [place.uav for place in group]
             name = uavs[0] if len(uavs) == 1 else f"agents of {uavs[0]} and {len(uavs) - 1} others"
