@@ -19,7 +19,6 @@ from agent.core.interface import (
     GoTo,
     OrderVehicle,
     Refused,
-    Telemetry,
     VehicleOrder,
     VehicleReady,
     VehicleReport,
@@ -390,9 +389,6 @@ class World:
             return status
         return as_flown(uav, status, vehicle.telemetry(), brief)
 
-    def _telemetry(self, uav: str) -> Telemetry | None:
-        return self._vehicles[uav].telemetry()
-
     # -- processes --------------------------------------------------------------------
 
     def _process(
@@ -427,16 +423,17 @@ class World:
             memory_age_s=age_s,
             without_bus_s=self._setting.without_bus_s,
         )
-        vehicle = self._vehicles.get(name)
+        vehicle = self._vehicles[name]
+        is_watched = type(agent).step is not AgentCore.step  # who times steps wants all of them
         return new(
             name,
             agent,
             snapshot=agent.snapshot,
             whole=agent.whole,
-            telemetry=partial(self._telemetry, name),
+            telemetry=vehicle.telemetry,
             telemetry_s=self._setting.telemetry_s,
             together=True,
-            attention=agent.attention,
+            attention=None if is_watched else agent.attention,
             telemetry_at=vehicle.telemetry_at if isinstance(vehicle, IdealVehicle) else None,
         )
 
