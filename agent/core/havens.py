@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import numpy.typing as npt
 
 from agent.core.base_visits import BaseVisits
 from agent.core.context import AgentContext, AgentPart
@@ -79,33 +80,38 @@ class Havens(AgentPart):
         base = None if nearest is None or nearest.base is None else self._base(nearest.base)
         if nearest is None or (base is not None and self.is_usable(base, now_s)):
             return nearest
-        if base is None and self._machine.state is not AgentState.IDLE:
-            return nearest
-        reached = self._within_reach(now_s)
-        if base is None:
-            reached = [haven for haven in reached if self._leads_on(haven)]
+        reached = []
+        if base is not None:
+            reached = self._within_reach(now_s)
+        elif self._machine.state is AgentState.IDLE and self._tasks_ahead().any():
+            reached = [haven for haven in self._within_reach(now_s) if self._leads_on(haven)]
         found = min(reached, key=_arrival, default=None)
         if found is None:
             return nearest
         way = found.way
         return HomeFlight(way.via_enu_m, way.end_enu_m, found.base.id, way.duration_s)
 
+    def _tasks_ahead(self) -> npt.NDArray[np.bool_]:
+        """(n_task,) which tasks are open that the UAV is able to do."""
+        problem = self._flights.problem
+        if problem is None:
+            return np.zeros(0, dtype=np.bool_)
+        there = np.array([self._mission_view.is_open(task) for task in problem.task_ids], bool)
+        return there & problem.capable[problem.uav_ids.index(UavId(self._uav))]
+
     def _leads_on(self, haven: Haven) -> bool:
         """Whether a task is open that the UAV could do alone from there, with a full battery."""
         problem = self._flights.problem
-        if problem is None or self._uav not in problem.uav_ids:
+        if problem is None:
             return False
         row, base = problem.uav_ids.index(UavId(self._uav)), BaseId(haven.base.id)
         leg_s = problem.leg_s[problem.kind[row], problem.n_uav + problem.base_ids.index(base)]
-        there = np.array([self._mission_view.is_open(task) for task in problem.task_ids], bool)
-        if not (there & problem.capable[row]).any():  # as mostly for who hovers
-            return False
         enter, leave = problem.enter, problem.enter[:, ::-1]
         line_s = problem.line_s[problem.kind[row]] + problem.service_s[:, None]
         in_time = np.maximum(haven.ready_s + leg_s[enter], problem.opens_s[:, None])
         in_time = in_time <= problem.closes_s[:, None]
         lasts = leg_s[enter] + line_s + problem.home_s[row][leave] <= problem.full_s[row]
-        return bool((in_time & lasts & (there & problem.capable[row])[:, None]).any())
+        return bool((in_time & lasts & self._tasks_ahead()[:, None]).any())
 
     def reach(self, name: str, now_s: float) -> Haven | None:
         """That base, flown to from here; None if it is unknown, or zones leave no way."""

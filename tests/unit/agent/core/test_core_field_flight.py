@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import pytest
 
+from agent.core.flights import Flights
 from agent.core.interface import Arrived, GoTo, Refused, Return
 from agent.core.states import AgentState
 from swarm.model.ids import FLEET, OPERATOR
@@ -297,6 +298,24 @@ def test_with_nothing_to_do_it_goes_to_its_start_for_good_if_that_is_nearest(
     assert agent.way_home.via_enu_m == ABOVE_START
     assert agent.way_home.land
     assert agent.phase is ClaimPhase.OUT
+
+
+def test_with_nothing_open_it_asks_for_no_ways_to_other_bases_while_it_hovers(
+    script: Script, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    agent = FieldAgent(bases=[FAR_BASE])
+    agent.fly_to(entry("t0", 40.0))
+    script.items = ["t0"]
+    agent.start_mission()
+    agent.run_until(39.0)
+    asked: list[str] = []
+    monkeypatch.setattr(Flights, "way_to_base", lambda _flights, base: asked.append(base))
+
+    agent.arrive(40.0)
+    agent.run_until(50.0)
+
+    assert agent.state() is AgentState.IDLE
+    assert asked == []
 
 
 @pytest.mark.parametrize(("east_m", "goes_on"), [(60.0, True), (300.0, False)])
