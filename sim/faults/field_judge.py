@@ -27,7 +27,7 @@ from sim.world.flight_log import LastSeen
 from sim.world.flown_path import MotionPiece
 from sim.world.motion import Point, flown_s
 from sim.world.virtual_world import World
-from swarm.allocation.field import FieldProblem
+from swarm.allocation.field import problem_of
 from swarm.model import Mission, Zone
 from swarm.separation.fleet_layers import fleet_layers_m
 
@@ -269,7 +269,7 @@ class Chances:
         self._mission, self._zero_s = mission, zero_s
         times = [1.0 / _slowest(flaws, uav.id) for uav in mission.uavs]
         self._drains = [_drain_frac(flaws, uav.id) for uav in mission.uavs]
-        self._problem = FieldProblem.from_mission(mission).calibrated(times, self._drains)
+        self._problem = problem_of(mission).calibrated(times, self._drains)
         self._slack_s = slack_s
         self._swaps = np.array([base.id not in blocked for base in mission.bases], dtype=np.bool_)
 
@@ -288,9 +288,9 @@ class Chances:
             if uav not in seen:
                 continue
             for column, task in enumerate(self._mission.tasks):
-                wanted = task.id in tasks and task.due_s is None
-                ends_s = self._ends_s(row, column, seen[uav], self._problem.n_base)
-                if wanted and ends_s < math.inf:
+                if task.id not in tasks or task.due_s is not None:
+                    continue
+                if self._ends_s(row, column, seen[uav], self._problem.n_base) < math.inf:
                     found.setdefault(task.id, []).append(uav)
         return found
 

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from sim.world.engine import stream
-from swarm.allocation.field import FieldProblem
+from swarm.allocation.field import problem_of
 from swarm.allocation.legs import Airspace
 from swarm.allocation.legs.planner import PathPlanner
 from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId, Zone, ZoneId
@@ -71,7 +71,7 @@ def fair_drain_frac(mission: Mission, uav: str) -> float:
     Who turns home when its charge, the reserve aside, just gets it there has the reserve for what
     the way takes beyond that, and for the wait for a slot.
     """
-    problem = FieldProblem.from_mission(mission)
+    problem = problem_of(mission)
     row = [str(each.id) for each in mission.uavs].index(uav)
     me = mission.uavs[row]
     if me.endurance_s is None:

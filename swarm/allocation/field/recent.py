@@ -14,12 +14,12 @@ from swarm.model import Mission
 
 _KEPT = 4
 
-_recent: deque[tuple[Mission, tuple[float, ...], FieldProblem]] = deque(maxlen=_KEPT)
+_recent: deque[tuple[Mission, tuple[float, ...] | None, FieldProblem]] = deque(maxlen=_KEPT)
 
 
-def problem_of(mission: Mission, layers_m: Sequence[float]) -> FieldProblem:
+def problem_of(mission: Mission, layers_m: Sequence[float] | None = None) -> FieldProblem:
     """As `FieldProblem.from_mission`; of equal missions and layers the very same."""
-    layers = tuple(layers_m)
+    layers = None if layers_m is None else tuple(layers_m)
     for known, known_layers, problem in tuple(_recent):
         if known_layers == layers and known == mission:
             return problem

@@ -319,6 +319,20 @@ def test_an_endless_battery_could_do_what_opens_late() -> None:
     assert could(replace(NEAR, opens_s=500.0), seen, endless) == ["u0"]
 
 
+def test_only_tasks_that_are_asked_about_are_looked_at(monkeypatch: pytest.MonkeyPatch) -> None:
+    chances, looked_at = Chances(MISSION, 0.0), list[int]()
+    ends_s = Chances._ends_s
+
+    def noted_s(self: Chances, row: int, column: int, seen: LastSeen, visits: int) -> float:
+        looked_at.append(column)
+        return ends_s(self, row, column, seen, visits)
+
+    monkeypatch.setattr(Chances, "_ends_s", noted_s)
+    chances.could_do({"u0": SEEN}, ["t2"])
+
+    assert looked_at == [2]
+
+
 def test_a_base_on_whose_slots_the_lost_stand_swaps_nothing() -> None:
     mission = replace(MISSION, uavs=(CHARGED,), tasks=(NEAR,), bases=(BASE,))
     spent = {"u0": replace(SEEN, battery_frac=0.3)}

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from swarm.allocation.field import FieldProblem, FieldState
+from swarm.allocation.field import FieldProblem, FieldState, problem_of
 from swarm.model import Mission, Task, TaskId, Uav, UavId, Zone, ZoneId
 from tests.support.field_missions import mission_of
 from tests.support.field_oracle.flight import FlightTimes
@@ -172,6 +172,18 @@ def test_no_uavs_and_no_tasks_are_a_problem_too() -> None:
 
     assert FieldProblem.from_mission(mission, uavs=nobody).n_uav == 0
     assert FieldProblem.from_mission(mission, tasks=()).n_task == 0
+
+
+def test_problems_of_equal_missions_are_made_once_with_given_layers_and_without() -> None:
+    mission, expected = made(1, "plain")
+
+    problem = problem_of(mission)
+
+    assert problem_of(replace(mission)) is problem
+    assert np.array_equal(problem.leg_s, expected.leg_s)
+    layered = problem_of(mission, [10.0, 20.0])
+    assert layered is not problem
+    assert problem_of(replace(mission), (10.0, 20.0)) is layered
 
 
 def test_one_layer_for_each_uav() -> None:
