@@ -235,7 +235,7 @@ class RoughNetwork:
         return not any(self._reaches(sender, seat) for seat in self._seats if seat is not sender)
 
     def _reaches(self, sender: Node, receiver: Node) -> bool:
-        muted = self._muted[sender.name, receiver.name]
+        muted = self._muted.get((sender.name, receiver.name))
         return not muted and self.joined(sender, receiver)
 
     # -- messages ---------------------------------------------------------------------
