@@ -97,14 +97,15 @@ class Havens(AgentPart):
         if problem is None:
             return np.zeros(0, dtype=np.bool_)
         there = np.array([self._mission_view.is_open(task) for task in problem.task_ids], bool)
-        return there & problem.capable[problem.uav_ids.index(UavId(self._uav))]
+        ahead: npt.NDArray[np.bool_] = there & problem.capable[self._row(problem)]
+        return ahead
 
     def _leads_on(self, haven: Haven) -> bool:
         """Whether a task is open that the UAV could do alone from there, with a full battery."""
         problem = self._flights.problem
         if problem is None:
             return False
-        row, base = problem.uav_ids.index(UavId(self._uav)), BaseId(haven.base.id)
+        row, base = self._row(problem), BaseId(haven.base.id)
         leg_s = problem.leg_s[problem.kind[row], problem.n_uav + problem.base_ids.index(base)]
         enter, leave = problem.enter, problem.enter[:, ::-1]
         line_s = problem.line_s[problem.kind[row]] + problem.service_s[:, None]
@@ -186,6 +187,9 @@ class Havens(AgentPart):
         if name not in self._ways:
             self._ways[name] = self._flights.way_to_base(name)
         return self._ways[name]
+
+    def _row(self, problem: field.FieldProblem) -> int:
+        return problem.uav_ids.index(UavId(self._uav))
 
     def _base(self, name: str) -> BaseSpec | None:
         return self._flights.base(name)
