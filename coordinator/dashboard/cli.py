@@ -120,9 +120,10 @@ def dashboard(
     from swarm.runtime.process import SERVICE_NOTIFIER, run_until_stopped
 
     configure_logging(log_level, log_format)
+    check_mission(mission)
+    seat = seat.found(mission, operator=True)
     network = seat.network
     config = seat.config(mission=mission, roles=(Role.VIEWER, Role.OPERATOR, Role.COORDINATOR))
-    check_mission(mission)
     token = read_token(token_file, os.environ)
     access, made = access_for(host, allow_host or (), token)
     display = _display(access.token is not None, tiles, tiles_credit)

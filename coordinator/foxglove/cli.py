@@ -119,7 +119,7 @@ def foxglove(
 
     configure_logging(log_level, log_format)
     check_mission(mission)
-    network = seat.network
+    network = seat.found(mission).network
 
     def found() -> BusConfig:
         # Looked for again and again: a run of this machine may begin later than this.

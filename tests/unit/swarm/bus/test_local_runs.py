@@ -16,6 +16,7 @@ from swarm.bus import connection as seat_module
 from swarm.bus.config import MeshTopology
 from swarm.bus.connection import ConnectionOptions
 from swarm.bus.local_runs import LocalRun, announced, begun, local_runs
+from swarm.cli import main
 from swarm.protocol.timing import LinkKind
 from swarm.runtime.errors import InputError
 
@@ -200,3 +201,16 @@ def test_keys_of_the_run_are_those_of_who_asks_and_have_to_be_readable(tmp_path:
             ConnectionOptions().found(None, operator=True)
         given = ConnectionOptions(bus="run", keys=viewer).found(None, operator=True)
         assert given.keys == viewer
+
+
+@pytest.mark.parametrize("command", ["dashboard", "foxglove", "ros2"])
+def test_who_shows_a_mission_finds_the_run_of_this_machine(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with on(RUN):
+        assert main([command, "--check", "--bus", "run"]) == 0
+        assert main([command, "--check", "--bus", "run:1"]) == 2
+    assert "--bus: run:1: no run of this user is on here" in capsys.readouterr().err
+    with on(RUN, PARENT):
+        assert main([command, "--check"]) == 2
+    assert "several runs are on here" in capsys.readouterr().err
