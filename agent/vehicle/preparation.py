@@ -172,6 +172,8 @@ class Preparation:
             self._follow_mission(self._mission, heartbeat)
         elif heartbeat.armed and firmware.is_taking_off(heartbeat.custom_mode):
             self._follow_takeoff(heartbeat.custom_mode)
+        elif self.took_off and self._awaits_motors(heartbeat):
+            self._session.say(*self._start_motors())
         elif not firmware.is_commanded(heartbeat.custom_mode):
             self._get_commanded(heartbeat)
         elif not heartbeat.armed:
@@ -252,6 +254,9 @@ class Preparation:
             return self._fail("the vehicle disarmed after takeoff")
         if self._order.left_in_air and not self._arm.command.given:
             return self._wait(NO_PLACE) if vehicle.position is None else self._fail(_CAME_DOWN)
+        if self._firmware.first_item is not None and (objection := self._runway.advance()):
+            # Its checks fail as long as the landing is what it would begin with.
+            return self._wait_for_runway(objection)
         if unready := self._firmware.unready(vehicle):
             return self._wait(with_warning(self._session, unready))
         if objection := self._session.arming_objection():
@@ -269,9 +274,26 @@ class Preparation:
             return self._wait_for_runway(objection)
         if self._session.awaits_turn:
             return self._wait(_NOT_ITS_TURN)
-        self._consent.arm()
         self._session.launched_enu_m = self._session.known_place_m()
+        heartbeat = vehicle.heartbeat
+        if self._firmware.motors_begin_takeoff and place is not None and heartbeat is not None:
+            self._expect_climb(place)
+            if not self._awaits_motors(heartbeat):
+                command = self._firmware.takeoff(self._start_alt_m(), home_alt_m(place))
+                return self._ask(self._takeoff, command)
+        self._consent.arm()
         return self._ask(self._arm, self._firmware.arm())
+
+    def _awaits_motors(self, heartbeat: Heartbeat) -> bool:
+        """Whether it takes off as soon as its motors run."""
+        firmware, mode = self._firmware, heartbeat.custom_mode
+        begins = firmware.motors_begin_takeoff and firmware.is_taking_off(mode)
+        return begins and not heartbeat.armed
+
+    def _expect_climb(self, position: Position) -> None:
+        self._climbing = True
+        self._climbed_at_s = self._session.now_s
+        self._highest_m = position.alt_m
 
     def _start_alt_m(self) -> float:
         return wgs84_from_enu(self._config.origin, self._order.position_enu_m)[2]
@@ -286,9 +308,7 @@ class Preparation:
     def _take_off(self, position: Position) -> list[Outbound]:
         if not self._aims_at(position):
             return self._wait(NO_PLACE)
-        self._climbing = True
-        self._climbed_at_s = self._session.now_s
-        self._highest_m = position.alt_m
+        self._expect_climb(position)
         # Also here, as a vehicle found armed on the ground comes straight to takeoff.
         if objection := self._session.arming_objection():
             return self._wait(objection)
@@ -343,6 +363,9 @@ class Preparation:
     def _settle(self, position: Position) -> None:
         """Fly to the start, unless the vehicle is resumed in the air, and set the speed."""
         speed = self._speed
+        if not (self._firmware.traits.stays or self._limits.is_read):
+            self.waiting_for = "reading the radius of its circles"  # on which it has arrived
+            return
         if self._leg is None and not self._resumes and not self._aims_at(position):
             self.waiting_for = NO_PLACE
             return

@@ -144,6 +144,9 @@ _QUADPLANE: Final = {
 _PLANE: Final = {
     **_CALIBRATED,
     **_RADIO,
+    # At 1100, the least unless told otherwise, the model's propeller pulls it along the ground.
+    "SERVO3_MIN": 1000,
+    "SERVO3_MAX": 2000,
     "AIRSPEED_MIN": 10,
     "AIRSPEED_MAX": 30,
     "AIRSPEED_CRUISE": 22,

@@ -181,6 +181,24 @@ def test_killed_on_its_way_and_started_anew_it_goes_on(
     flight.run_until(Arrived(1))
 
 
+@pytest.mark.parametrize(
+    ("kind", "flavour"),
+    [(VehicleKind.QUADPLANE, ARDUPILOT), (VehicleKind.PLANE, PX4), (VehicleKind.PLANE, ARDUPILOT)],
+)
+def test_started_anew_it_knows_how_wide_its_circle_is(
+    kind: VehicleKind, flavour: FirmwareModelName
+) -> None:
+    wide = replace(VEHICLES[kind], circle_m=2.0 * CIRCLE_M)
+    flight = JoinedFlight(CONFIG, firmware_model(flavour, kind), wide)
+    flight.to_bridge(STARTS[kind])
+    flight.run_until(VehicleReady())
+    flight.restart_bridge(dead_s=4.0)
+    flight.to_bridge(replace(STARTS[kind], resume=True))
+    flight.run_until(VehicleReady())
+    flight.to_bridge(GoTo(1, FAR[kind]))
+    flight.run_until(Arrived(1))
+
+
 @KINDS
 def test_its_pilot_takes_it_over(kind: VehicleKind, flavour: FirmwareModelName) -> None:
     flight = started(kind, flavour)

@@ -72,6 +72,9 @@ class ArduPlane(WingedArduPilot):
     caution = "ArduPlane on a runway has been flown in simulation alone"
     landing_names = ("Q_ENABLE", "RTL_AUTOLAND", "WP_LOITER_RAD")
     first_item = _TAKE_OFF_SEQ
+    motors_begin_takeoff = True
+    """As people start it; in GUIDED its throttle opens on the ground once it moves, or its height
+    drifts."""
     mode_names = MappingProxyType(
         {
             **{(*mode, 0): name for mode, name in WingedArduPilot.mode_names.items()},

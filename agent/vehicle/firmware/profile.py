@@ -82,6 +82,8 @@ class Firmware(ABC):
     """Whether it is known how to command it by missions."""
     landing_names: ClassVar[tuple[str, ...]] = ()
     """Parameters that say how it lands along a runway."""
+    motors_begin_takeoff: ClassVar[bool] = False
+    """It is put into the mode in which it takes off first, and does so as soon as they run."""
     first_item: ClassVar[int | None] = None
     """Item of the mission of what needs a runway with which it takes off; None: by none."""
     stops_within_m: ClassVar[float] = 0.0
