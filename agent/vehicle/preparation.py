@@ -113,7 +113,6 @@ class Preparation:
 
     def tell_cautions(self) -> None:
         """Tell what people should know of a vehicle that is armed all the same, once it is read."""
-        self._session.tell_caution("firmware", self._firmware.caution)
         if self._limits.is_read:
             self._session.tell_caution("limits", self._limits.caution)
         if self._failsafes.is_read:

@@ -400,6 +400,16 @@ def test_it_rises_before_it_is_turned(order: Hold | Return) -> None:
     assert all(at[1] == pytest.approx(HOME_M[1]) for at in rising_m)
 
 
+def test_its_mission_is_put_on_it_before_its_checks_pass() -> None:
+    flight = joined(VehicleKind.PLANE)
+    flight.vehicle.pilot.readiness.lose_gps(HOME_M, flight.now_s)
+    flight.to_bridge(STARTS[VehicleKind.PLANE])
+    flight.wait(20.0)
+    assert len(flight.vehicle.pilot.store.items) == 7
+    assert flight.vehicle.pilot.run.told == 1
+    assert not flight.vehicle.pilot.armed
+
+
 def test_it_takes_off_again_after_it_has_landed() -> None:
     flight = started(VehicleKind.PLANE)
     flight.to_bridge(Return("done"))

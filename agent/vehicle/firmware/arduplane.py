@@ -69,7 +69,6 @@ class ArduPlane(WingedArduPilot):
     kind = VehicleKind.PLANE
     vehicle_types = frozenset({1})
     """Fixed wing; QuadPlanes tell it, too, unless Q_MAV_TYPE says otherwise."""
-    caution = "ArduPlane on a runway has been flown in simulation alone"
     landing_names = ("Q_ENABLE", "RTL_AUTOLAND", "WP_LOITER_RAD")
     first_item = _TAKE_OFF_SEQ
     motors_begin_takeoff = True

@@ -76,8 +76,6 @@ class Firmware(ABC):
     """MAV_TYPE of what it flies or drives."""
     name: ClassVar[str]
     """For people."""
-    caution: ClassVar[str | None] = None
-    """What people should know before they fly it; None: nothing beyond what is written of all."""
     takes_missions: ClassVar[bool] = True
     """Whether it is known how to command it by missions."""
     landing_names: ClassVar[tuple[str, ...]] = ()

@@ -303,11 +303,8 @@ def _failsafes(name: str, reading: FailsafeReading) -> CheckFinding:
 
 def _kind(name: str, flavour: Firmware) -> list[CheckFinding]:
     """What it is, and what it is not flown with; nothing of a copter."""
-    limits, what = flavour.traits.limits, f"{name} kind"
-    told = f"a {flavour.kind}: {limits}"
-    if flavour.caution is not None:
-        return [warns(what, f"{told}; {flavour.caution}", "try it where little is lost")]
-    return [fine(what, told)] if limits else []
+    limits = flavour.traits.limits
+    return [fine(f"{name} kind", f"a {flavour.kind}: {limits}")] if limits else []
 
 
 def _limits(name: str, limits: Kinematics) -> CheckFinding:

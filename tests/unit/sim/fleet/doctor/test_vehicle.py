@@ -126,11 +126,10 @@ def test_a_circle_is_told_among_its_limits() -> None:
     )
 
 
-def test_that_a_kind_has_been_simulated_alone_is_told() -> None:
-    told = found(Speaker().say(heartbeat(vehicle_type=1)))[f"{NAME} kind"]
-    assert told.state is CheckState.WARNING
-    assert told.text.startswith("a plane: passes its targets")
-    assert told.text.endswith("; ArduPlane on a runway has been flown in simulation alone")
+def test_a_plane_without_rotors_is_told_to_need_a_runway() -> None:
+    told = found(Speaker().say(heartbeat(vehicle_type=1)))
+    assert told[NAME].state is CheckState.OK
+    assert "lands along a runway at its start alone" in told[f"{NAME} kind"].text
 
 
 def test_what_it_does_without_its_agent_is_told_with_what_would_bring_it_home() -> None:
