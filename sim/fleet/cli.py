@@ -83,7 +83,7 @@ def run(
             "--firmware",
             metavar="PATH",
             help="With ardupilot: the arducopter binary; default: SWARM_SITL_ARDUCOPTER (rovers "
-            "and QuadPlanes of the scenario: by SWARM_SITL_ROVER and SWARM_SITL_PLANE). With px4: "
+            "and planes of the scenario: by SWARM_SITL_ROVER and SWARM_SITL_PLANE). With px4: "
             "a build folder such as build/px4_sitl_default; default: SWARM_SITL_PX4.",
         ),
     ] = None,
