@@ -27,6 +27,7 @@ PANELS: Mapping[str, tuple[str, ...]] = {
     "Watch and command": (
         "status",
         "dashboard",
+        "foxglove",
         "ros2",
         "start",
         "task",
