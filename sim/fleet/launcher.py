@@ -122,7 +122,7 @@ class Launcher:
         for group in agent_groups(in_order, self.options):
             await self._pace.room()
             uavs = [place.uav for place in group]
-            name = uavs[0] if len(uavs) == 1 else f"agents of {uavs[0]} and {len(uavs) - 1} others"
+            name = uavs[0] if len(uavs) == 1 else f"agents of {uavs[0]} and {len(uavs) - 1} more"
             child = await self._start(name, layout.agents(group))
             self._current.update(dict.fromkeys(uavs, child))
             self._pace.started(child, len(group))

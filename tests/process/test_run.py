@@ -102,8 +102,8 @@ def test_agents_that_share_a_process_fly_as_others_do(tmp_path: Path) -> None:
             for path in logs.glob("agents*")
         }
         assert {name: {each["uav"] for each in said} for name, said in lines.items()} == {
-            "agents-of-uav01-to-uav03": {"uav01", "uav02", "uav03"},
-            "agents-of-uav04-to-uav05": {"uav04", "uav05"},
+            "agents-of-uav05-and-2-more": {"uav01", "uav03", "uav05"},
+            "agents-of-uav04-and-1-more": {"uav02", "uav04"},
         }
         scenario.unlink()
         run.assert_nothing_left(but="logs")
