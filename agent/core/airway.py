@@ -359,7 +359,7 @@ class Airway:
                 self._pursue(air, self._aside, now_s)
         if wish is None or self._aside is not None:
             return []
-        spent = wish.asked and self._mission_view.mission_s(now_s) > end_s
+        spent = wish.asked and self._fleet.ends_too_late(wish, end_s)
         if wish.task is not None and (now_s - wish.since_s > GIVES_UP_S or spent):
             self._wish = None
             self._way = hovering(self._told_way)

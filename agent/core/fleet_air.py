@@ -292,10 +292,13 @@ class FleetAir:
         me = self._mission_view.me
         if me is None or me.endurance_s is None or math.isinf(sortie_end_s):
             return self._mission_view.mission_s(wish.since_s) + PATIENT_S
-        way_s = wish.takes_s
-        if way_s is None:
-            way_s = length_m(wish.corners_enu_m) / me.speed_m_s
+        way_s = _way_s(wish, me)
         return sortie_end_s + _OF_RESERVE * self._reserve_s(me) - way_s - climb_s
+
+    def ends_too_late(self, wish: Wish, sortie_end_s: float) -> bool:
+        """Whether its way, set off on now, would end when it must have landed already."""
+        me = self._mission_view.me
+        return me is not None and self._mission_s + _way_s(wish, me) > sortie_end_s
 
     def can_fly(self, wish: Wish, path_enu_m: Sequence[Point], sortie_end_s: float) -> bool:
         """Whether its battery lasts for a way home that climbs into another layer first."""
@@ -488,3 +491,10 @@ class FleetAir:
     @property
     def _mission_s(self) -> float:
         return self._mission_view.mission_s(self._mission_view.now_s)
+
+
+def _way_s(wish: Wish, me: UavSpec) -> float:
+    """How long that way takes [s]."""
+    if wish.takes_s is not None:
+        return wish.takes_s
+    return length_m(wish.corners_enu_m) / me.speed_m_s

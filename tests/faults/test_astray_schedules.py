@@ -12,6 +12,7 @@ BROKEN_ONCE = {
     5001560: "who was in a new zone waited for a long way, and landed there beside a free way out",
     5000176: "the judge asked for a slot's holder to be known that was cut off before it came",
     5002105: "who did not know enough to decide stayed in a new zone until it did",
+    5000996: "who waited for a way set off on it when its battery did not last any more",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 
