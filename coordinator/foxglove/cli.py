@@ -13,10 +13,12 @@ from swarm.runtime.log import LogFormat, LogLevel
 from swarm.runtime.option_groups import with_options
 from swarm.runtime.options import (
     CheckOption,
+    HostOption,
     JsonOption,
     LifelineOption,
     LogFormatOption,
     LogLevelOption,
+    PortOption,
     SomeMissionOption,
     SpeedupOption,
 )
@@ -36,18 +38,8 @@ LOOK_S = 0.1
 @with_options
 def foxglove(
     mission: SomeMissionOption = None,
-    host: Annotated[
-        str,
-        typer.Option(
-            "--host",
-            metavar="ADDRESS",
-            help="Where to listen. Beyond this machine everyone needs the token.",
-        ),
-    ] = "127.0.0.1",
-    port: Annotated[
-        int,
-        typer.Option("--port", min=0, max=65535, metavar="PORT", help="0: any that is free."),
-    ] = 8765,
+    host: HostOption = "127.0.0.1",
+    port: PortOption = 8765,
     token_file: Annotated[
         Path | None,
         typer.Option(

@@ -235,3 +235,17 @@ StateOption = Annotated[
         show_default=False,
     ),
 ]
+
+HostOption = Annotated[
+    str,
+    typer.Option(
+        "--host",
+        metavar="ADDRESS",
+        help="Where to listen. Beyond this machine everyone needs the token.",
+    ),
+]
+
+PortOption = Annotated[
+    int,
+    typer.Option("--port", min=0, max=65535, metavar="PORT", help="0: any that is free."),
+]
