@@ -9,6 +9,7 @@ from sim.faults.generator import random_case
 
 BROKEN_ONCE = {
     5001693: "an agent that began anew counted twice how fast its battery drains",
+    5001206: "an agent that began anew counted again what its earlier life knew, but had not told",
     5001560: "who was in a new zone waited for a long way, and landed there beside a free way out",
     5000176: "the judge asked for a slot's holder to be known that was cut off before it came",
     5002105: "who did not know enough to decide stayed in a new zone until it did",

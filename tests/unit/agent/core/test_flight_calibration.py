@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -98,6 +99,25 @@ def test_what_an_earlier_life_said_of_the_sortie_holds_its_drain_already() -> No
     later.heed(1.6, 20.0)
 
     assert later.end_s == 50.0
+
+
+@pytest.mark.parametrize("told", [1.0, 1.32])
+def test_a_later_life_does_not_count_again_what_the_earlier_one_had_measured_but_not_told(
+    told: float,
+) -> None:
+    before, later = SortieClock(), SortieClock()
+    before.begin(ME, 0.0)
+    before.heed(1.6, 0.0)
+    assert before.end_s == 50.0
+
+    later.recall(before.told_s, told)
+    later.measure(ME, 0.68, 20.0)  # 0.48 above the reserve: it drains 1.6 times as fast as planned
+    later.heed(1.6, 20.0)
+    later.measure(ME, 0.68, 20.0)
+
+    assert later.end_s == 50.0
+    later.measure(ME, 0.36, 30.0)  # and from now on by its charge
+    assert later.end_s == 40.0
 
 
 def test_a_sortie_that_drains_as_planned_is_as_it_was() -> None:
