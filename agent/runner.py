@@ -35,8 +35,9 @@ from swarm.protocol.sync import some_of
 from swarm.protocol.timing import PRESETS, LinkKind
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import BusError
+from swarm.runtime.joining import join_mission
 from swarm.runtime.process import SERVICE_NOTIFIER, ServiceNotifier, StopRequest
-from swarm.runtime.shell import Shell, join_mission
+from swarm.runtime.shell import Shell
 from swarm.runtime.store import Memory, Store
 
 RETRY_S = 0.5
@@ -321,7 +322,8 @@ class _Flight:
     def _report(self, news: VehicleReport | StationAsked) -> None:
         if isinstance(news, ReturnBegun):
             self.returns.set()
-        if not isinstance(news, Telemetry):  # most of all, what the next task is may follow
+        # What the next task is may follow, or who gives way.
+        if not isinstance(news, Telemetry) or self.shell.is_due:
             self.shell.gather()
         self.shell.step(news)
 

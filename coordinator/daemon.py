@@ -39,9 +39,10 @@ from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.seal import Seal
 from swarm.protocol.timing import PRESETS, LinkKind, Timing
 from swarm.runtime.clock import Clock, SystemClock
+from swarm.runtime.joining import join_mission
 from swarm.runtime.log import get_logger
 from swarm.runtime.process import SERVICE_NOTIFIER, call_in_background
-from swarm.runtime.shell import Shell, join_mission
+from swarm.runtime.shell import Shell
 from swarm.runtime.store import Store
 
 MissionPlanner = Callable[[MakePlan, ShouldStop], Plan]

@@ -20,7 +20,8 @@ from swarm.protocol.timing import PRESETS, LinkKind, Timing
 from swarm.runtime.clock import Clock, ScaledClock
 from swarm.runtime.console import say
 from swarm.runtime.errors import Fault, InputError, SwarmError
-from swarm.runtime.shell import Core, Shell, join_mission
+from swarm.runtime.joining import join_mission
+from swarm.runtime.shell import Core, Shell
 
 SETTLE_S = 0.4
 """Wall time after the first token of a mission in which those of others come too."""

@@ -173,6 +173,7 @@ class AgentCore(AgentPart):
         if isinstance(event, MessageReceived | MessagesReceived):
             event = self._sync.without_repeated(event, now_s)
             if self._is_idle(now_s) and self.attention.only_remembers(event, now_s):
+                self._deadline_s = earliest(self._deadline_s, self._near_traffic.next_deadline_s())
                 return []
         if self._is_idle(now_s) and self._sync.only_meets(event, now_s):
             return self._end_step(now_s)
@@ -264,7 +265,6 @@ class AgentCore(AgentPart):
             case MessageReceived() | MessagesReceived():
                 for message in event.messages:
                     self._sync.hear(message, now_s)
-                    self._near_traffic.hear(message, now_s)
             case SnapshotsReceived(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):

@@ -34,7 +34,7 @@ from agent.core.room_aside import RoomAside
 from agent.core.states import AgentState
 from agent.core.take_off_turn import TakeOffTurn, who_is_in
 from swarm.protocol.board import ranks
-from swarm.protocol.events import Cell, TuneIn
+from swarm.protocol.events import Cell, MessageReceived, MessagesReceived, TuneIn
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import Message, MissionConfig, Stamp
 from swarm.protocol.timing import earliest
@@ -51,7 +51,9 @@ from swarm.separation.tactical_traffic import (
 )
 
 BEACON_S = 1.0
-"""Between two words of a UAV with nobody near it."""
+"""Between two looks of a UAV that stands on the ground."""
+_GROUNDED_S = 10.0
+"""Between two words of a UAV that has been on the ground for so long, which nobody needs."""
 _ALOFT_M = 1.0
 """Who is that far above where it started flies."""
 _LIKELY_AGE_S = 0.2
@@ -89,6 +91,7 @@ class NearTraffic(AgentPart):
         self.when_disturbed: Callable[[], None] = lambda: None
         """Is told when the vehicle no longer flies as it was ordered."""
         self._brief: MissionConfig | None = None
+        self._fleet: frozenset[str] = frozenset()
         self._rules: TrafficRules | None = None
         self._resolver: TacticalResolver | None = None
         self._picture: TrafficPicture | None = None
@@ -110,13 +113,23 @@ class NearTraffic(AgentPart):
         self._waited_s: float | None = None
         """When it last waited for somebody before it took off or landed."""
         self._decide_at_s = -math.inf
-        self._say_at_s = -math.inf
+        self._said_s = self._say_at_s = -math.inf
+        self._pace_s = BEACON_S
+        """Between two of its words, by its last decision."""
+        self._said: object = None
+        """What of its last word changes only with what it is told to do."""
+        self._grounded_since_s: float | None = None
+        """When it was first seen on the ground, since it was in the air last."""
 
     # -- what it hears ------------------------------------------------------------------
 
     def sense(self, event: Event) -> None:
-        """What the vehicle says, before anybody else hears it."""
+        """What the vehicle says, before anybody else hears it; and others near it."""
         match event:
+            case MessageReceived() | MessagesReceived():
+                for message in event.messages:
+                    if isinstance(message.body, Nearby):
+                        self._hear(message, message.body, self._mission_view.now_s)
             case Telemetry():
                 self._telemetry = event
             case Landed() | Home():
@@ -126,16 +139,14 @@ class NearTraffic(AgentPart):
             case _:
                 pass
 
-    def hear(self, message: Message, now_s: float) -> None:
+    def _hear(self, message: Message, body: Nearby, now_s: float) -> None:
         """Another UAV says where it is."""
-        body, writer = message.body, message.writer
-        known = self._stamps.get(writer)
+        writer, known = message.writer, self._stamps.get(message.writer)
         if (
-            not isinstance(body, Nearby)
-            or writer == self._uav
+            writer == self._uav
             or self._picture is None
             or (known is not None and message.stamp <= known)
-            or not self._is_in_brief(writer)
+            or writer not in self._fleet
         ):
             return
         age_s = self._age_s(body.said_s, now_s)
@@ -152,7 +163,8 @@ class NearTraffic(AgentPart):
             body.speed_m_s,
             Precedence(Grade(body.grade), body.rank, body.depth),
         )
-        self._picture.hear(writer, word, now_s, age_s)
+        if self._picture.hear(writer, word, now_s, age_s) and self._rules is not None:
+            self._decide_at_s = min(self._decide_at_s, now_s + self._rules.tick_s)
 
     def _age_s(self, said_s: float | None, now_s: float) -> float | None:
         """How old a word is, as far as the time of the mission tells; None: not of now."""
@@ -161,10 +173,6 @@ class NearTraffic(AgentPart):
             return _LIKELY_AGE_S
         age_s = mission_s - said_s
         return max(0.0, age_s) if abs(age_s) <= _OLD_S else None
-
-    def _is_in_brief(self, uav: str) -> bool:
-        brief = self._replica.brief
-        return brief is not None and any(uav == each.id for each in brief.uavs)
 
     # -- what follows ---------------------------------------------------------------------
 
@@ -188,6 +196,8 @@ class NearTraffic(AgentPart):
             self._take_turn(own, now_s)
             if aloft:
                 self._decide(own, now_s)
+            else:
+                self._pace_s = BEACON_S
         self._ordered = False
         self._tell(own, aloft=aloft or self._is_let_go, now_s=now_s)
 
@@ -244,7 +254,7 @@ class NearTraffic(AgentPart):
             self._announcer.explain(f"waits for {before} before it takes off")
             return
         self._turn.end()
-        self._is_let_go, self._say_at_s = True, now_s
+        self._is_let_go = True
         self._actions.append(OrderVehicle(_BY_ITSELF))
 
     def _blame(self, uav: str | None, picture: TrafficPicture, now_s: float) -> None:
@@ -258,6 +268,7 @@ class NearTraffic(AgentPart):
         brief = self._replica.brief
         if brief is not self._brief:
             self._brief = brief
+            self._fleet = frozenset(() if brief is None else (uav.id for uav in brief.uavs))
             rules = None if brief is None or not self._is_flown else rules_of(brief)
             if rules != self._rules:
                 self._rules = rules
@@ -321,7 +332,9 @@ class NearTraffic(AgentPart):
         if rules is None or resolver is None or picture is None:
             return
         before, advice = resolver.advice, resolver.decide(own, picture, now_s)
-        self._decide_at_s = now_s + (rules.tick_s if picture.is_busy else BEACON_S / 2.0)
+        self._pace_s = resolver.pace_s(own, picture, now_s)
+        self._decide_at_s = now_s + min(self._pace_s, rules.beacon_s / 2.0)
+        self._say_at_s = min(self._say_at_s, self._said_s + self._pace_s)
         if not own.gives_way:
             return
         wanted = _order_of(advice)
@@ -366,12 +379,24 @@ class NearTraffic(AgentPart):
             self._actions.append(TuneIn(cells))
 
     def _tell(self, own: OwnFlight, *, aloft: bool, now_s: float) -> None:
-        resolver, picture, rules = self._resolver, self._picture, self._rules
-        if now_s < self._say_at_s or resolver is None or picture is None or rules is None:
+        """Say where it is: at the pace of its last decision, and a tick after it said otherwise."""
+        resolver, rules = self._resolver, self._rules
+        if resolver is None or rules is None:
             return
-        busy = picture.is_busy and aloft
-        self._say_at_s = now_s + (rules.tick_s if busy else BEACON_S)
         word = resolver.word(own)
+        said = aloft, word.path_enu_m, word.speed_m_s, word.precedence
+        if said != self._said:
+            self._say_at_s = min(self._say_at_s, self._said_s + rules.tick_s)
+        if now_s < self._say_at_s:
+            return
+        if aloft:
+            self._grounded_since_s = None
+        elif self._grounded_since_s is None:
+            self._grounded_since_s = now_s
+        since_s = self._grounded_since_s
+        is_long = since_s is not None and now_s - since_s >= _GROUNDED_S
+        self._said, self._said_s = said, now_s
+        self._say_at_s = now_s + (_GROUNDED_S if is_long else self._pace_s)
         place = word.position_enu_m
         self._say(
             Nearby(

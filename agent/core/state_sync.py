@@ -30,7 +30,7 @@ from swarm.protocol.messages import (
 from swarm.protocol.registers import without_signers
 from swarm.protocol.sync import EVERYONE_UP_TO, QuestionTimer, some_of
 from swarm.protocol.timing import Timing, earliest, stretch_of
-from swarm.protocol.uav_messages import ClaimPhase
+from swarm.protocol.uav_messages import ClaimPhase, Nearby
 
 _LAST_WORDS = 3
 """How often others are asked again at least what somebody who was lost has said at last."""
@@ -95,12 +95,14 @@ class StateSync(AgentPart):
     ) -> MessagesReceived:
         """What of that something may follow from but that its writer lives.
 
-        Nothing does where another UAV repeats what is known of it, and its word counts already.
+        Nothing does where another UAV repeats what is known of it, or says where it is, and its
+        word counts already.
         """
         news = []
         for message in event.messages:
             counts = self._peers.membership.is_credible(message.writer)
-            is_known = counts and self._replica.known(message) is message
+            near = isinstance(message.body, Nearby)
+            is_known = counts and (near or self._replica.known(message) is message)
             if is_known and message.writer != COORDINATOR:
                 self._peers.heard(message, self._replica, now_s)
             else:

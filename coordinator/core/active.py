@@ -235,9 +235,8 @@ class CoordinatorCore:
 
     def _refuse_older(self, uav: str, status: Status) -> None:
         """Say once of an agent that it cannot read this mission's brief, and so takes no part."""
-        asked = self._mission.asks_for
         waits = status.phase is StatusPhase.LEARNING and status.dropped.get(UNKNOWN_VERSION, 0) > 0
-        if not waits or not asked or uav in self._too_old:
+        if not waits or uav in self._too_old or not (asked := self._mission.asks_for):
             return
         self._too_old.add(uav)
         told: dict[str, object] = {"uav": uav, "asks_for": ", ".join(asked)}

@@ -30,7 +30,8 @@ from swarm.protocol.events import CommonAction, CommonEvent
 from swarm.protocol.messages import MissionPhase
 from swarm.protocol.timing import UNSTRETCHED_UAVS, preset
 from swarm.runtime.clock import ScaledClock
-from swarm.runtime.shell import Core, Shell, join_mission
+from swarm.runtime.joining import join_mission
+from swarm.runtime.shell import Core, Shell
 
 FRAME_S = 0.2
 """Wall time between two pictures."""

@@ -20,8 +20,9 @@ from swarm.protocol.messages import roster_message
 from swarm.runtime.clock import SystemClock
 from swarm.runtime.console import say
 from swarm.runtime.errors import SwarmError
+from swarm.runtime.joining import join_mission
 from swarm.runtime.log import LogLevel, configure_logging
-from swarm.runtime.shell import Shell, join_mission
+from swarm.runtime.shell import Shell
 
 CONNECT_S: Final = 10.0
 """How long to wait for the bus [s]."""

@@ -53,6 +53,7 @@ from swarm.protocol.shared_messages import SharedMessages
 from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind
 from swarm.protocol.uav_messages import News
 from swarm.runtime.clock import Clock
+from swarm.runtime.joining import gathered_keys
 from swarm.runtime.log import get_logger
 from swarm.runtime.state_exchange import StateExchange, draw_nonce
 
@@ -105,9 +106,9 @@ class Shell(Generic[E, A]):
         context: what every note of the core is logged with, besides its own fields.
         draw_nonce: makes the nonce of a question, see swarm.protocol.sync.
         together: makes the core's event of several messages that came one after the other. With
-            it the shell of a large fleet is not woken by each claim, outcome and task of the
-            board: it looks now and then, and before it decides anything by itself. None for a
-            core that wants to hear each when it comes.
+            it the shell of a large fleet is not woken by each claim, outcome, task of the
+            board and word of somebody near: it looks now and then, and before it decides anything
+            by itself. None for a core that wants to hear each when it comes.
         settled: whether nothing would follow at once from what others claim.
         crowd: see `StateExchange`.
         shared: what others in this process have heard; None for one that is alone there.
@@ -229,6 +230,8 @@ class Shell(Generic[E, A]):
             for key_expr in gathered_keys(self._keys):
                 self._bus.subscribe(key_expr, latest=True, gathered=True)
             self._gathering = self._loop.call_later(GATHER_S, self._gather)
+            for cell in self._cells:
+                self._hear_near(cell)
 
     def gather(self) -> None:
         """Let the core hear now what has come; call before something that it may decide by."""
@@ -330,11 +333,15 @@ class Shell(Generic[E, A]):
 
     def _tune_in(self, cells: frozenset[Cell]) -> None:
         """Hear what is said in these cells, of each UAV the newest, and in no others."""
-        for east, north in sorted(cells - self._cells):
-            self._bus.subscribe(self._keys.near("*", east, north), latest=True)
+        for cell in sorted(cells - self._cells):
+            self._hear_near(cell)
         for east, north in sorted(self._cells - cells):
             self._bus.unsubscribe(self._keys.near("*", east, north))
         self._cells = cells
+
+    def _hear_near(self, cell: Cell) -> None:
+        key_expr = self._keys.near("*", *cell)
+        self._bus.subscribe(key_expr, latest=True, gathered=self._gathering is not None)
 
     def _reschedule(self) -> None:
         if self._timer is not None:
@@ -347,7 +354,16 @@ class Shell(Generic[E, A]):
 
     def _tick(self) -> None:
         self.gather()
-        self.step(self._from_bus(Tick()))
+        if self.is_due:
+            self.step(self._from_bus(Tick()))
+        elif not self._done.done():  # what was gathered has seen to it, or the timer was early
+            self._guard(lambda: None)
+
+    @property
+    def is_due(self) -> bool:
+        """Whether the core wants a tick by now."""
+        deadline_s = self._core.next_deadline_s()
+        return deadline_s is not None and deadline_s <= self._clock.now_s()
 
     def _gather(self) -> None:
         """Take what has come into the inbox, and look again later."""
@@ -449,52 +465,3 @@ class Shell(Generic[E, A]):
         learned = await self._questions.ask(heed, of)
         self._expect(message for snapshot in learned for message in snapshot.messages)
         self.step(self._from_bus(SnapshotsReceived(learned)))
-
-
-def gathered_keys(keys: KeySpace) -> tuple[str, ...]:
-    """What everybody says with each decision, and what is only repeated."""
-    return keys.claim("*"), keys.outcome("*", "*"), keys.board("*")
-
-
-def join_mission(
-    bus: Bus, mission: str, name: str | None, *, status: bool, every_status: bool = False
-) -> None:
-    """Subscribe to what every process of a mission needs, and show that this one is there.
-
-    Subscribes to ``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/outcome/*``,
-    ``uav/*/calibration``, ``operator/*``, ``operator/task/*``, ``operator/start/*``,
-    ``operator/zone/*`` and ``operator/ready/*``, where there are keys ``roster``, watches
-    ``alive/*``.
-
-    Args:
-        bus: an open bus.
-        mission: mission name.
-        name: writer id: declares ``alive/<name>`` and serves ``state/<name>``; None for
-            an observer.
-        status: subscribe to ``uav/*/status`` too, newest first, and to ``uav/*/choice``.
-        every_status: of status keep all there is, for who records, not the newest alone.
-    """
-    keys = KeySpace(mission)
-    for key_expr in (
-        keys.brief,
-        keys.plan,
-        keys.board("*"),
-        keys.claim("*"),
-        keys.outcome("*", "*"),
-        keys.calibration("*"),
-        keys.operator("*"),
-        keys.operator_task("*"),
-        keys.operator_start("*"),
-        keys.operator_zone("*"),
-        keys.operator_ready("*"),
-    ):
-        bus.subscribe(key_expr)
-    if status:
-        bus.subscribe(keys.status("*"), latest=not every_status)
-        bus.subscribe(keys.choice("*"))
-    if bus.seal is not None:
-        bus.subscribe(keys.roster)
-    bus.watch_tokens(keys.alive("*"))
-    if name is not None:
-        bus.serve(keys.state(name))
-        bus.declare_token(keys.alive(name))

@@ -16,9 +16,9 @@ from enum import Enum
 
 import numpy as np
 
+from swarm.separation.tactical_look import WIDE_M, Other, pace_s
 from swarm.separation.tactical_motion import (
     STEP_S,
-    FloatArray,
     Place,
     least_distance_m,
     least_meeting_m,
@@ -26,7 +26,9 @@ from swarm.separation.tactical_motion import (
     round_m,
     stop_place_m,
 )
+from swarm.separation.tactical_reach import reach
 from swarm.separation.tactical_traffic import (
+    SILENT_S,
     Grade,
     NearbyTrack,
     Precedence,
@@ -93,25 +95,9 @@ class _Option:
     label: str
 
 
-@dataclass(frozen=True, slots=True)
-class _Other:
-    """Another UAV, as it counts in one decision."""
-
-    uav: str
-    track: NearbyTrack
-    expected_m: FloatArray
-    column_m: FloatArray | None
-    """What it passes straight up or down, whenever."""
-    stops_m: FloatArray
-    stray_m: tuple[float, float]
-    goes_first: bool
-
-
 Clear = Callable[[Sequence[Place]], bool]
 
 _SLOW = 0.5
-_WIDE_M = 0.7
-"""Who has given way goes on only where there is so much more room."""
 _GRID_M = 0.3
 """What samples of two motions may miss of their least distance."""
 _CLEAR_S = 1.0
@@ -149,7 +135,9 @@ class TacticalResolver:
         self._stood_since_s: float | None = None
         self._braked_since_s: float | None = None
         self._brakes_until_s = -math.inf
-        self._decided_s: float | None = None
+        self._decided_s = -math.inf
+        self._since_s = -math.inf
+        """When it began to decide: it had not for a while, as on the ground."""
         self._borrowed: Precedence | None = None
         """Of the one for whom it makes room."""
         self._left: dict[str, float] = {}
@@ -182,8 +170,9 @@ class TacticalResolver:
             picture: those near it.
             now_s: now, on the own clock.
         """
-        passed_s = 0.0 if self._decided_s is None else now_s - self._decided_s
-        self._decided_s = now_s
+        passed_s, self._decided_s = now_s - self._decided_s, now_s
+        if passed_s > SILENT_S:
+            self._since_s, passed_s = now_s, 0.0
         if not own.gives_way:
             self._end()
             return self._advice
@@ -205,20 +194,28 @@ class TacticalResolver:
         self._adopt(own, option, because_of, barred_by, others, now_s)
         return self._advice
 
+    def pace_s(self, own: OwnFlight, picture: TrafficPicture, now_s: float) -> float:
+        """How long the next decision and the next word can wait after the last one [s].
+
+        A tick where it gives way, and as long as it may not have been heard; else see `pace_s`.
+        """
+        gives_way = self._advice.braked or self._advice.maneuver is not Maneuver.KEEP
+        if gives_way or now_s - self._since_s < SILENT_S:
+            return self._rules.tick_s
+        return pace_s(self.word(own), picture, self._rules, now_s, gives_way=own.gives_way)
+
     # -- those near it ------------------------------------------------------------------
 
-    def _look(self, own: OwnFlight, uav: str, track: NearbyTrack, now_s: float) -> _Other:
-        stops_m, stray_m = track.stops_m(now_s, self._rules)
+    def _look(self, own: OwnFlight, uav: str, track: NearbyTrack, now_s: float) -> Other:
         mine = self._borrowed or own.precedence
         theirs = track.word.precedence
         silent = track.is_silent(now_s) or self._obstinate.get(uav, -math.inf) > now_s
         first = track.is_plausible(now_s) and (
             silent or (theirs, uav) < (mine, self._uav) or theirs.grade is Grade.BOUND
         )
-        expected_m = track.expected_m(now_s, self._rules)
-        return _Other(uav, track, expected_m, track.column_m(), stops_m, stray_m, first)
+        return Other(uav, track, now_s, self._rules, goes_first=first)
 
-    def _blame(self, others: Sequence[_Other], passed_s: float, now_s: float) -> None:
+    def _blame(self, others: Sequence[Other], passed_s: float, now_s: float) -> None:
         """Count who has kept this UAV from flying its way since the last decision."""
         if not self._advice.stands and self._advice.maneuver is not Maneuver.ASIDE:
             return
@@ -229,7 +226,7 @@ class TacticalResolver:
     # -- giving way ---------------------------------------------------------------------
 
     def _choose(
-        self, own: OwnFlight, others: Sequence[_Other], now_s: float
+        self, own: OwnFlight, others: Sequence[Other], now_s: float
     ) -> tuple[_Option, str | None]:
         """What it would do, and who is the reason."""
         keep = _Option(Maneuver.KEEP, own.path_enu_m, own.speed_m_s, "keep")
@@ -262,7 +259,7 @@ class TacticalResolver:
         hold = _Option(Maneuver.HOLD, (), own.speed_m_s, "hold")
         return hold, in_way or self._advice.because_of
 
-    def _gets_out(self, option: _Option, others: Sequence[_Other]) -> bool:
+    def _gets_out(self, option: _Option, others: Sequence[Other]) -> bool:
         """Whether it waits off the ways of all who go first, though they come before it is there.
 
         They brake for it; that they would fly on at once is no reason to stay in their way.
@@ -294,7 +291,7 @@ class TacticalResolver:
         return _Option(option.maneuver, path_m, option.speed_m_s, option.label)
 
     def _options(
-        self, own: OwnFlight, others: Sequence[_Other], in_way: str | None, now_s: float
+        self, own: OwnFlight, others: Sequence[Other], in_way: str | None, now_s: float
     ) -> Iterator[_Option]:
         """What it may do instead of flying on, the least first."""
         speed_m_s, hold = own.speed_m_s, _Option(Maneuver.HOLD, (), own.speed_m_s, "hold")
@@ -327,13 +324,15 @@ class TacticalResolver:
         return options
 
     def _round(
-        self, own: OwnFlight, stop_m: Place, others: Sequence[_Other], in_way: str | None
+        self, own: OwnFlight, stop_m: Place, others: Sequence[Other], in_way: str | None
     ) -> Iterator[_Option]:
         """Past one that stands in its way on a side, where it can't fly higher or lower."""
         for other in others:
+            if other.uav != in_way:
+                continue
             here_m, there_m = other.expected_m[0], other.expected_m[-1]
-            if other.uav == in_way and math.dist(here_m, there_m) < _STANDS_M:
-                sides = round_m(stop_m, other.expected_m[0], self._rules.aside_m)
+            if math.dist(here_m, there_m) < _STANDS_M:
+                sides = round_m(stop_m, here_m, self._rules.aside_m)
                 for label, corners in zip(("right", "left"), sides, strict=False):
                     path_m = (*corners, *own.path_enu_m)
                     yield _Option(Maneuver.OVER, path_m, own.speed_m_s, f"round {label}")
@@ -342,7 +341,7 @@ class TacticalResolver:
         aside_m = self._rules.aside_m
         return [(f"{share:+d}", share * aside_m) for share in (1, -1, 2, -2)]
 
-    def _places_aside(self, stop_m: Place, threat: _Other | None) -> Iterator[tuple[str, Place]]:
+    def _places_aside(self, stop_m: Place, threat: Other | None) -> Iterator[tuple[str, Place]]:
         """Where it could wait: up, down, and beside the way of the one that comes."""
         for label, rise_m in self._rises():
             place_m = (stop_m[0], stop_m[1], stop_m[2] + rise_m)
@@ -368,21 +367,26 @@ class TacticalResolver:
         return self._clear(path_m)
 
     def _in_way(
-        self, own: OwnFlight, option: _Option, others: Sequence[_Other], *, wide: bool = False
+        self, own: OwnFlight, option: _Option, others: Sequence[Other], *, wide: bool = False
     ) -> str | None:
         """To whom it would come too near that goes first; None: to nobody."""
         rules = self._rules
-        way_m = motion_m(
-            *(own.position_enu_m, own.velocity_enu_m_s, option.path_enu_m),
-            option.speed_m_s,
-            rules.agility,
-            math.inf,
-            rules.horizon_s,
-        )
-        asked_m = rules.apart_m + (_WIDE_M if wide else 0.0)
-        for other in others:
-            if not other.goes_first:
-                continue
+        flown = own.position_enu_m, own.velocity_enu_m_s, option.path_enu_m, option.speed_m_s
+        asked_m = rules.apart_m + (WIDE_M if wide else 0.0)
+        mine = reach(*flown, rules.agility, rules.horizon_s)
+        near = [
+            other
+            for other in others
+            if other.goes_first
+            and (
+                mine.distance_m(other.ahead) < asked_m
+                or (other.track.is_upright and mine.distance_m(other.track.column) < asked_m)
+            )
+        ]
+        if not near:
+            return None
+        way_m = motion_m(*flown, rules.agility, math.inf, rules.horizon_s)
+        for other in near:
             # Who is nearer already comes no nearer.
             here_m = math.dist(way_m[0], other.expected_m[0]) - _GRID_M
             if least_meeting_m(way_m, other.expected_m) < min(asked_m, here_m):
@@ -396,29 +400,30 @@ class TacticalResolver:
     # -- braking ------------------------------------------------------------------------
 
     def _barred_by(
-        self, own: OwnFlight, option: _Option, others: Sequence[_Other], *, wide: bool
+        self, own: OwnFlight, option: _Option, others: Sequence[Other], *, wide: bool
     ) -> str | None:
         """Before whom it has to brake, as it could not stop short of it any more a tick later."""
         rules = self._rules
         if not option.path_enu_m:
             return None
         drive_s = rules.tick_s + rules.reaction_s
+        flown = own.position_enu_m, own.velocity_enu_m_s, option.path_enu_m, option.speed_m_s
+        asked_m = rules.separation_m + _GRID_M + (WIDE_M if wide else 0.0)
+        mine = reach(*flown, rules.agility, drive_s, brakes=True)
+        near = [other for other in others if mine.distance_m(other.halts) < asked_m]
+        if not near:
+            return None
         fast_m_s = max(option.speed_m_s, math.hypot(*own.velocity_enu_m_s))
-        way_m = motion_m(
-            *(own.position_enu_m, own.velocity_enu_m_s, option.path_enu_m),
-            option.speed_m_s,
-            rules.agility,
-            drive_s,
-            drive_s + fast_m_s / rules.agility.acceleration_m_s2 + STEP_S,
-        )
-        asked_m = rules.separation_m + _GRID_M + (_WIDE_M if wide else 0.0)
-        for other in others:
-            if least_distance_m(way_m, other.stops_m, other.stray_m) >= asked_m:
+        span_s = drive_s + fast_m_s / rules.agility.acceleration_m_s2 + STEP_S
+        way_m = motion_m(*flown, rules.agility, drive_s, span_s)
+        for other in near:
+            stops_m, stray = other.stops_m
+            if least_distance_m(way_m, stops_m, stray) >= asked_m:
                 continue
             # Who is nearer already comes no nearer.
-            inside = least_distance_m(way_m[:1], other.stops_m, other.stray_m) < asked_m
-            here_m = least_distance_m(way_m[:1], other.stops_m) - _GRID_M
-            if not inside or least_distance_m(way_m, other.stops_m) < here_m:
+            inside = least_distance_m(way_m[:1], stops_m, stray) < asked_m
+            here_m = least_distance_m(way_m[:1], stops_m) - _GRID_M
+            if not inside or least_distance_m(way_m, stops_m) < here_m:
                 return other.uav
         return None
 
@@ -430,7 +435,7 @@ class TacticalResolver:
         option: _Option,
         because_of: str | None,
         barred_by: str | None,
-        others: Sequence[_Other],
+        others: Sequence[Other],
         now_s: float,
     ) -> None:
         before = self._option
@@ -485,7 +490,7 @@ MOST_CORNERS = 4
 """Of its way ahead a UAV tells no more."""
 
 
-def _heading(threat: _Other | None) -> tuple[float, float]:
+def _heading(threat: Other | None) -> tuple[float, float]:
     """Which way another one is about to fly: east and north of a unit vector."""
     if threat is not None:
         east, north = (threat.expected_m[-1] - threat.expected_m[0])[:2].tolist()

@@ -22,6 +22,7 @@ from swarm.separation.tactical_motion import (
     motion_m,
     stray_m,
 )
+from swarm.separation.tactical_reach import Cylinder, reach
 
 
 class Grade(IntEnum):
@@ -95,14 +96,16 @@ class TrafficRules:
     reaction_s: float = 0.8
     """From a decision until the vehicle does it, at the most."""
     tick_s: float = 0.25
-    """Between two decisions, at the most, and between two words while somebody is near."""
+    """Between two decisions, at the most, and between two words while somebody is close."""
+    beacon_s: float = 1.0
+    """Between two words else."""
     low_m: float = -math.inf
     """No UAV gives way to below this height [m; mission origin]."""
     high_m: float = math.inf
     """Nor to above this one."""
 
     def __post_init__(self) -> None:
-        for name in ("separation_m", "cruise_m_s", "reaction_s", "tick_s"):
+        for name in ("separation_m", "cruise_m_s", "reaction_s", "tick_s", "beacon_s"):
             if not 0.0 < getattr(self, name) < math.inf:
                 raise ValueError(f"{name} must be > 0 and finite, not {getattr(self, name)}")
         if not 0.0 <= self.position_error_m < math.inf:
@@ -240,16 +243,36 @@ class NearbyTrack:
         samples = 1 + math.ceil(rules.horizon_s / STEP_S)
         return way_m[-samples:]
 
-    def column_m(self) -> FloatArray | None:
-        """All that it is going to pass straight up or down, as it can't do otherwise; else None."""
+    def reach_ahead(self, now_s: float, rules: TrafficRules) -> Cylinder:
+        """Holds all of `expected_m`."""
+        word, age_s = self.word, max(0.0, now_s - self.said_s)
+        return reach(
+            *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s),
+            rules.agility,
+            age_s + rules.horizon_s,
+        )
+
+    @property
+    def is_upright(self) -> bool:
+        """Whether it climbs or comes down, straight, and can't do otherwise."""
         word = self.word
         if word.precedence.grade is not Grade.BOUND or not word.path_enu_m:
-            return None
-        here, end = word.position_enu_m, word.path_enu_m[-1]
-        if math.dist(here[:2], end[:2]) > _STANDS_M:
-            return None
-        low_m, high_m = here[2] - _MOST_COLUMN_M, here[2] + _MOST_COLUMN_M
-        return column_m(here, min(max(end[2], low_m), high_m))
+            return False
+        return math.dist(word.position_enu_m[:2], word.path_enu_m[-1][:2]) <= _STANDS_M
+
+    @property
+    def column(self) -> Cylinder:
+        """Holds all of `column_m`, of one that is upright."""
+        here, end_up_m = self.word.position_enu_m, self._column_end_m()
+        return Cylinder(here, 0.0, min(here[2], end_up_m), max(here[2], end_up_m))
+
+    def column_m(self) -> FloatArray | None:
+        """All that it is going to pass straight up or down, as it can't do otherwise; else None."""
+        return column_m(self.word.position_enu_m, self._column_end_m()) if self.is_upright else None
+
+    def _column_end_m(self) -> float:
+        here_m, end_m = self.word.position_enu_m[2], self.word.path_enu_m[-1][2]
+        return min(max(end_m, here_m - _MOST_COLUMN_M), here_m + _MOST_COLUMN_M)
 
     def stops_m(self, now_s: float, rules: TrafficRules) -> tuple[FloatArray, tuple[float, float]]:
         """Where it may be before it has stopped, however it decides until it hears more.
@@ -259,7 +282,7 @@ class NearbyTrack:
         """
         age_s, word = max(0.0, now_s - self.said_s), self.word
         fast_m_s = max(word.speed_m_s, math.hypot(*word.velocity_enu_m_s))
-        drive_s = min(age_s, FORGET_S) + rules.reaction_s + rules.tick_s
+        drive_s = _drive_s(age_s, rules)
         way_m = motion_m(
             *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m),
             word.speed_m_s,
@@ -267,8 +290,26 @@ class NearbyTrack:
             drive_s,
             drive_s + fast_m_s / rules.agility.acceleration_m_s2 + STEP_S,
         )
-        speed_m_s = math.hypot(*word.velocity_enu_m_s)
-        return way_m, stray_m(min(age_s, SILENT_S), speed_m_s, rules.agility)
+        return way_m, self._stray_m(age_s, rules)
+
+    def reach_of_stops(self, now_s: float, rules: TrafficRules, later_s: float = 0.0) -> Cylinder:
+        """Holds all of `stops_m`, with what it may stray; with the same word so much later."""
+        age_s, word = max(0.0, now_s + later_s - self.said_s), self.word
+        return reach(
+            *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s),
+            rules.agility,
+            _drive_s(age_s, rules),
+            brakes=True,
+        ).grown(self._stray_m(age_s, rules))
+
+    def _stray_m(self, age_s: float, rules: TrafficRules) -> tuple[float, float]:
+        speed_m_s = math.hypot(*self.word.velocity_enu_m_s)
+        return stray_m(min(age_s, SILENT_S), speed_m_s, rules.agility)
+
+
+def _drive_s(age_s: float, rules: TrafficRules) -> float:
+    """How long it may have flown on as it said before it brakes, with a word so old."""
+    return min(age_s, FORGET_S) + rules.reaction_s + rules.tick_s
 
 
 class TrafficPicture:
@@ -286,8 +327,8 @@ class TrafficPicture:
         self._gone: dict[str, NearbyTrack] = {}
         """Who has landed or left: what it has cost still counts when it is back."""
 
-    def hear(self, uav: str, word: TrafficWord, now_s: float, age_s: float) -> None:
-        """Another UAV says so of itself.
+    def hear(self, uav: str, word: TrafficWord, now_s: float, age_s: float) -> bool:
+        """Another UAV says so of itself; whether it was not known to be near, or silent.
 
         Args:
             uav: which.
@@ -296,18 +337,16 @@ class TrafficPicture:
             age_s: how old the word is, as far as that is known.
         """
         word = word.within(self._rules.fastest_m_s)
-        track = self._tracks.get(uav) or self._gone.get(uav)
+        known = self._tracks.get(uav)
+        is_new = known is None or known.is_silent(now_s)
+        track = known or self._gone.get(uav)
         if track is None:
             self._tracks[uav] = NearbyTrack(word, now_s, age_s)
         elif now_s - age_s >= track.said_s:
             self._tracks[uav] = track
             self._gone.pop(uav, None)
             track.hear(word, now_s, age_s, self._rules)
-
-    @property
-    def is_busy(self) -> bool:
-        """Whether anybody may be near."""
-        return bool(self._tracks)
+        return is_new
 
     def place_of(self, uav: str) -> Place | None:
         """Where a UAV said last that it is; None: it is not heard."""

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from swarm.protocol.events import CommonAction, CommonEvent, Finish, MessagesReceived, Stop, Tick
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, Snapshot
-from swarm.runtime.shell import Shell, join_mission
+from swarm.runtime.joining import join_mission
+from swarm.runtime.shell import Shell
 from tests.support.builders import MISSION, held, message
 from tests.support.memory_bus import MemoryBus, MemoryNetwork
 from tests.support.shell_play import HandClock

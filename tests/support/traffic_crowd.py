@@ -104,7 +104,9 @@ class Crowd:
         due = [mail for mail in self._mail if mail[0] <= self.now_s]
         self._mail = [mail for mail in self._mail if mail[0] > self.now_s]
         for at_s, to, of, word, said_s in due:
-            self.pictures[to].hear(of, word, self.now_s, at_s - said_s)
+            if self.pictures[to].hear(of, word, self.now_s, at_s - said_s):
+                each = next(each for each in self.flyers if each.uav == to)
+                each.next_tick_s = min(each.next_tick_s, self.now_s + self.rules.tick_s)
         if self.now_s >= self._lie_at_s:
             self._lie_at_s += self.rules.tick_s
             for lie in self._liars:
@@ -113,7 +115,6 @@ class Crowd:
                         picture.hear(of, word, self.now_s, 0.0)
         for flyer in self.flyers:
             if self.now_s >= flyer.next_tick_s and self.now_s < flyer.dies_s:
-                flyer.next_tick_s += self.rules.tick_s
                 self._decide(flyer)
             while flyer.waiting and flyer.waiting[0][0] <= self.now_s:
                 advice = flyer.waiting.pop(0)[1]
@@ -154,6 +155,7 @@ class Crowd:
         if (before.maneuver, before.braked) != (advice.maneuver, advice.braked):
             label = advice.maneuver.value + (" braked" if advice.braked else "")
             flyer.story.append((round(self.now_s, 2), f"{label} for {advice.because_of}"))
+        flyer.next_tick_s += resolver.pace_s(own, self.pictures[flyer.uav], self.now_s)
         flyer.waiting.append((self.now_s + self._command_s, advice))
         word = resolver.word(own)
         for other in self.flyers:

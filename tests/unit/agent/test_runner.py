@@ -36,8 +36,8 @@ from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, MissionConfig, MissionPhase, Snapshot
 from swarm.protocol.timing import Timing
 from swarm.runtime.errors import BusError
+from swarm.runtime.joining import join_mission
 from swarm.runtime.process import StopRequest
-from swarm.runtime.shell import join_mission
 from tests.support.builders import IDLE, MISSION, brief, epoch, message, uav
 from tests.support.memory_bus import MemoryBus, MemoryNetwork
 from tests.support.shell_play import HandClock, play, take_until, until

@@ -25,7 +25,7 @@ from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Body, Message, MissionPhase
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
-from swarm.runtime.shell import join_mission
+from swarm.runtime.joining import join_mission
 from tests.support.builders import IDLE, MISSION, OUT, done, held, message, mission, task, uav
 from tests.support.memory_bus import MemoryBus, MemoryNetwork
 from tests.support.shell_play import LIMIT_S, HandClock, play, take_until, until

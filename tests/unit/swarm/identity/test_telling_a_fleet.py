@@ -20,7 +20,8 @@ from swarm.protocol.messages import Snapshot, roster_message
 from swarm.protocol.registers import Replica
 from swarm.protocol.seal import Seal
 from swarm.runtime.clock import ScaledClock
-from swarm.runtime.shell import Shell, join_mission
+from swarm.runtime.joining import join_mission
+from swarm.runtime.shell import Shell
 from tests.support.builders import MISSION
 from tests.support.keyring import Keyring
 from tests.support.memory_bus import MemoryBus, MemoryNetwork

@@ -13,6 +13,7 @@ from swarm.protocol.encoding import encode
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.shared_messages import SharedMessages
+from swarm.protocol.uav_messages import Nearby
 from tests.support.builders import IDLE, MISSION, entry, held, message, status
 from tests.support.message_strategies import messages
 
@@ -62,9 +63,29 @@ def test_what_is_not_said_again_goes_and_what_is_stays() -> None:
     assert shared.find(encode(once)) is None
 
 
-def test_news_is_not_kept() -> None:
+def test_what_is_for_onlookers_is_not_kept() -> None:
     shared, said = SharedMessages(), message("u0", status())
 
     shared.keep(encode(said), said)
 
     assert shared.find(encode(said)) is None
+
+
+def nearby(place_m: float) -> Nearby:
+    place = (place_m, 0.0, 30.0)
+    return Nearby((0, 0), True, place, (0.0, 0.0, 0.0), (), 8.0, 1, 2, 0, 5.0)
+
+
+def test_where_somebody_is_is_kept_for_all_near_it_and_drives_out_nothing_that_is_repeated() -> (
+    None
+):
+    shared, repeated = SharedMessages(), message("u1", held("t0", 1.0))
+    shared.keep(encode(repeated), repeated)
+
+    for number in range(10_000):
+        said = message("u0", nearby(float(number)), number)
+        shared.keep(encode(said), said)
+        assert shared.find(encode(said)) is said
+
+    assert shared.find(encode(repeated)) is repeated
+    assert shared.find(encode(message("u0", nearby(0.0), 0))) is None

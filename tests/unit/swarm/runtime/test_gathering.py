@@ -1,12 +1,23 @@
-"""How the shell of a large fleet hears claims, outcomes and board: now and then, and together."""
+"""How the shell of a large fleet hears claims, outcomes, board and who is near: now and then,
+and together."""
 
 from __future__ import annotations
 
+from functools import partial
+
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.encoding import encode
-from swarm.protocol.events import CommonEvent, MessageReceived, MessagesReceived, Tick
+from swarm.protocol.events import (
+    CommonEvent,
+    MessageReceived,
+    MessagesReceived,
+    Stop,
+    Tick,
+    TuneIn,
+)
 from swarm.protocol.messages import Message
 from swarm.protocol.timing import UNSTRETCHED_UAVS
+from swarm.protocol.uav_messages import Nearby
 from tests.support.builders import brief, done, epoch, held, message, uav
 from tests.support.scripted_shell import Played, ScriptedCore, at_work
 from tests.support.shell_play import play, until
@@ -96,6 +107,52 @@ def test_what_waits_is_heard_before_a_tick_and_on_demand() -> None:
             assert ear.heard == CLAIMS[:2]
 
     play(scenario)
+
+
+def test_a_tick_for_which_nothing_is_left_to_do_is_left_out() -> None:
+    """What was gathered before it has moved the deadline."""
+
+    async def scenario() -> None:
+        core, ear = ScriptedCore(), Ear()
+
+        def together(heard: MessagesReceived) -> CommonEvent:
+            core.deadline_s = None
+            return ear.together(heard)
+
+        async with at_work(core, together=together) as played:
+            await brief_of(core, played, ear, UNSTRETCHED_UAVS + 1)
+            core.deadline_s = played.clock.now_s()
+            said_by(played, CLAIMS[0])
+            before = core.heard.count(Tick())
+            played.shell.step(MessageReceived(EPOCH))  # sets the timer
+            await until(lambda: CLAIMS[0] in ear.heard, "the gathering")
+            assert core.heard.count(Tick()) == before + 1, "that of what was heard together"
+
+    play(scenario)
+
+
+def test_where_others_are_waits_in_a_large_fleet_and_wakes_the_shell_of_a_small_one() -> None:
+    async def scenario(n_uav: int, early: bool) -> None:
+        listen, tunes = Stop("listen"), TuneIn(frozenset({(0, 0)}))
+        core, ear = ScriptedCore(lambda event: [tunes] if event == listen else ()), Ear()
+        place = still = (0.0, 0.0, 0.0)
+        said = message("u2", Nearby((0, 0), True, place, still, (), 8.0, 1, 2, 0, 5.0))
+        async with at_work(core, together=ear.together) as played:
+            if early:
+                played.shell.step(listen)
+            await brief_of(core, played, ear, n_uav)
+            if not early:
+                played.shell.step(listen)
+            said_by(played, said)
+            if n_uav > UNSTRETCHED_UAVS:
+                played.shell.gather()
+                assert said in ear.heard
+            else:
+                await until(lambda: MessageReceived(said) in core.heard, "hearing it")
+
+    for early in (False, True):
+        play(partial(scenario, UNSTRETCHED_UAVS, early))
+        play(partial(scenario, UNSTRETCHED_UAVS + 1, early))
 
 
 def test_the_coordinators_plan_wakes_the_shell_of_any_fleet() -> None:

@@ -30,7 +30,8 @@ from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import SCHEMA_VERSION, Message, SignedRoster, Snapshot, Stamp
 from swarm.protocol.seal import ANSWER
 from swarm.protocol.sync import bond, decode_question, encode_question
-from swarm.runtime.shell import Shell, join_mission
+from swarm.runtime.joining import join_mission
+from swarm.runtime.shell import Shell
 from swarm.runtime.state_exchange import MOST_REFUSED, UNREAD
 from tests.support.builders import MISSION, epoch, held, message
 from tests.support.keyring import Keyring

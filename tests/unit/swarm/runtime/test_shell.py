@@ -29,7 +29,8 @@ from swarm.protocol.events import (
 from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.registers import Replica
 from swarm.runtime.errors import BusError
-from swarm.runtime.shell import Shell, join_mission
+from swarm.runtime.joining import join_mission
+from swarm.runtime.shell import Shell
 from tests.support.builders import (
     MISSION,
     brief,

@@ -10,11 +10,10 @@ import numpy as np
 import pytest
 import shapely
 
-from swarm.separation.tactical import Maneuver, OwnFlight, TacticalResolver
-from swarm.separation.tactical_motion import Agility, Place
+from swarm.separation.tactical import OwnFlight, TacticalResolver
+from swarm.separation.tactical_motion import Place
 from swarm.separation.tactical_traffic import (
     DISBELIEF_S,
-    FORGET_S,
     PATIENCE_S,
     Grade,
     NearbyTrack,
@@ -329,83 +328,3 @@ def test_one_that_lands_is_waited_for_longer_than_one_that_moves_about() -> None
 
 def no_way_round(_path: Sequence[Place]) -> bool:
     return False
-
-
-# -- words -------------------------------------------------------------------------------
-
-
-def test_the_lower_rank_gives_way_and_the_higher_flies_on() -> None:
-    advice = {}
-    for me, other in (("a", "b"), ("b", "a")):
-        picture = TrafficPicture(RULES, 250.0)
-        picture.hear(other, word_of(other), 0.0, 0.1)
-        advice[me] = TacticalResolver(me, RULES).decide(own_of(me), picture, 0.0)
-
-    assert advice["a"].maneuver is Maneuver.KEEP
-    assert not advice["a"].braked
-    assert advice["b"].maneuver is not Maneuver.KEEP
-    assert advice["b"].because_of == "a"
-
-
-def own_of(uav: str) -> OwnFlight:
-    """Two that are going to meet in the middle in 10 s."""
-    side = 1.0 if uav == "a" else -1.0
-    rank = 0 if uav == "a" else 1
-    return OwnFlight(
-        at(-80.0 * side, 0.0),
-        (8.0 * side, 0.0, 0.0),
-        (at(200.0 * side, 0.0),),
-        8.0,
-        Precedence(Grade.FLYING, rank),
-    )
-
-
-def word_of(uav: str) -> TrafficWord:
-    return TacticalResolver(uav, RULES).word(own_of(uav))
-
-
-def test_who_makes_room_goes_before_all_that_the_other_goes_before() -> None:
-    lent = Precedence(Grade.FLYING, 3).of_who_makes_room
-
-    assert Precedence(Grade.FLYING, 3) < lent < Precedence(Grade.FLYING, 4)
-
-
-def test_words_out_of_order_change_nothing() -> None:
-    picture = TrafficPicture(RULES, 250.0)
-    picture.hear("b", word_of("b"), 1.0, 0.1)
-    picture.hear("b", word_of("a"), 1.1, 0.9)
-
-    ((_, track),) = picture.near(at(0, 0), 1.1)
-    assert track.word == word_of("b")
-
-
-def test_nobody_is_remembered_for_ever() -> None:
-    picture = TrafficPicture(RULES, 1e9)
-    picture.hear("b", word_of("b"), 0.0, 0.0)
-
-    assert list(picture.near(at(0, 0), FORGET_S - 1.0))
-    assert not list(picture.near(at(0, 0), FORGET_S + 1.0))
-    assert not picture.is_busy
-
-
-def test_who_has_flown_out_of_hearing_is_forgotten_and_who_stays_away_silent_is_not() -> None:
-    picture = TrafficPicture(RULES, 50.0)
-    picture.hear("leaves", word_of("a"), 0.0, 0.0)
-    stays = TrafficWord(at(-40, 0), (0.0, 0.0, 0.0), (), 8.0, FIRST)
-    picture.hear("stays", stays, 0.0, 0.0)
-
-    assert [uav for uav, _ in picture.near(at(-80, 0), 12.0)] == ["stays"]
-
-
-def test_rules_out_of_range_are_refused() -> None:
-    with pytest.raises(ValueError, match="separation_m"):
-        TrafficRules(0.0, 8.0)
-    with pytest.raises(ValueError, match="cruise_m_s"):
-        TrafficRules(10.0, math.inf)
-    with pytest.raises(ValueError, match="position_error_m"):
-        TrafficRules(10.0, 8.0, position_error_m=-1.0)
-
-
-def test_agility_must_be_positive() -> None:
-    with pytest.raises(ValueError, match="climb_m_s"):
-        Agility(climb_m_s=0.0)

@@ -1,0 +1,104 @@
+"""How often UAVs behind real bridges say where they are: as it matters to those near them."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import pytest
+
+from agent.vehicle.config import CommandStyle
+from sim.autopilot.firmware import FirmwareModelName
+from sim.world.engine import Process
+from swarm.protocol.events import LogLine
+from swarm.protocol.messages import Message
+from swarm.protocol.uav_messages import Nearby
+from swarm.separation.tactical_traffic import SILENT_S
+from tests.support.bridged_crossings import CrossingFleet, mission_of
+
+KIND = (FirmwareModelName.ARDUPILOT, CommandStyle.REPOSITION)
+
+
+class Words:
+    """By UAV, when it said where it is [s], and what it said."""
+
+    def __init__(self) -> None:
+        self.said: dict[str, list[tuple[float, Nearby]]] = defaultdict(list)
+        self.fleet: CrossingFleet | None = None
+
+    def said_by(self, uav: str, since_s: float, until_s: float) -> int:
+        """How many within that time."""
+        return sum(since_s <= at_s < until_s for at_s, _ in self.said[uav])
+
+    def aloft(self, uav: str) -> tuple[float, float]:
+        """When it first and last said that it is in the air."""
+        instants_s = [at_s for at_s, word in self.said[uav] if word.airborne]
+        return instants_s[0], instants_s[-1]
+
+    # -- WorldListener ------------------------------------------------------------------
+
+    def said_now(self, process: Process, message: Message) -> None:
+        if isinstance(message.body, Nearby) and self.fleet is not None:
+            now_s = self.fleet.world.queue.now_s()
+            self.said[process.name].append((now_s, message.body))
+
+
+def flown(
+    monkeypatch: pytest.MonkeyPatch, *ways: tuple[tuple[float, float], tuple[float, float]]
+) -> Words:
+    words = Words()
+
+    class Listener:
+        def said(self, process: Process, message: Message) -> None:
+            words.said_now(process, message)
+
+        def stepped(self, process: Process) -> None:
+            pass
+
+        def raised(self, process: Process, fault: Exception) -> None:
+            raise fault
+
+        def refused(self, process: Process, order: object) -> None:
+            pass
+
+        def noted(self, process: Process, note: LogLine) -> None:
+            pass
+
+    mission = mission_of(*ways, band_m=(20.0, 60.0))
+    words.fleet = CrossingFleet(monkeypatch, *KIND, mission, planned=True, watch=Listener())
+    words.fleet.fly(300.0)
+    words.fleet.assert_all_done()
+    return words
+
+
+def test_who_climbs_beside_others_speaks_once_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four starts in a row, 14 m apart: nobody can give way, so nobody has to know at once."""
+    row = flown(monkeypatch, *(((14.0 * n, 0.0), (14.0 * n, 40.0)) for n in range(4)))
+
+    for uav in ("u0", "u1", "u2", "u3"):
+        leaves_s = next(at_s for at_s, word in row.said[uav] if word.position_enu_m[2] > 1.0)
+        climbs_s = leaves_s + SILENT_S + 0.5  # until then it may not have been heard
+        assert 2 <= row.said_by(uav, climbs_s, climbs_s + 3.0) <= 4, row.said[uav]
+
+
+def test_who_comes_near_another_one_speaks_four_times_as_often(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("agent.core.fleet_air.air_of_brief", lambda _brief: None)
+    words = flown(monkeypatch, ((-80.0, 0.0), (80.0, 3.0)), ((80.0, 3.0), (-80.0, 0.0)))
+
+    for uav in ("u0", "u1"):
+        busiest = max(words.said_by(uav, float(at_s), at_s + 4.0) for at_s in range(10, 60))
+        assert 14 <= busiest <= 17, words.said[uav]
+
+
+def test_who_stands_on_the_ground_for_long_says_so_every_ten_seconds(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """As the last of five does that start side by side, one after the other."""
+    words = flown(monkeypatch, *(((3.0 * n, 0.0), (-60.0 + 40.0 * n, 60.0)) for n in range(5)))
+
+    last = max(words.said, key=lambda uav: words.aloft(uav)[0])
+    waited_s = words.aloft(last)[0] - words.said[last][0][0]
+    assert waited_s > 25.0
+    on_ground = sum(not word.airborne for _, word in words.said[last])
+    assert 11 <= on_ground <= 13 + (waited_s - 10.0) / 10.0, words.said[last]
