@@ -78,9 +78,8 @@ class Airway:
         self._aloft = self._moves = False
         """Whether the vehicle may be anywhere on its way."""
         self._stops = False
-        """Whether it has been told to stop, for the wish to be asked from there."""
+        """Whether it has been told to stop, for the wish to be asked from there, and where."""
         self._stop_enu_m: Point | None = None
-        """Where."""
         self._own_height = False
         """Whether its way ends at the height of a task."""
         self._at_own_height = False
@@ -319,9 +318,10 @@ class Airway:
         claim = self._replica.claims.get(self._uav)
         if self._shared is None or claim is None:
             return None
-        left = self._left_base and claim.task is not None and claim.departs_s is not None
-        now = self.told(replace(claim, base=None, stage=None, departs_s=None) if left else claim)
-        self._left_base = False
+        now, until_s = claim, claim.sortie_end_s and self.sortie_end_s()
+        if self._left_base and claim.task is not None and claim.departs_s is not None:
+            now = replace(now, base=None, stage=None, departs_s=None, sortie_end_s=until_s)
+        now, self._left_base = self.told(now), False
         if adds_nothing(now.way, claim.way) and (now.base, now.stage) == (claim.base, claim.stage):
             return None
         return now

@@ -79,6 +79,8 @@ class BaseVisits(AgentPart):
         self._sortie = sortie
         self._become_free = become_free
         self._visit = BaseVisit()
+        self._left_from = BaseStage.LANDED
+        """Whether it left its last base from one of its slots, or from beside them."""
         self._on_ground: bool | None = None
         """Whether the vehicle stands at the base; None: as an earlier life has claimed."""
         self._vouched: dict[str, tuple[Stamp, Claim | None]] = {}
@@ -153,6 +155,7 @@ class BaseVisits(AgentPart):
     def leave_ground(self) -> str | None:
         """The vehicle takes off now; gives the base that it stood at, None if it is in the air."""
         base, self._on_ground = self.stands_at, False
+        self._left_from = BaseStage.PARKED if self.is_parked else BaseStage.LANDED
         self._mission_view.leave_ground()
         return base
 
@@ -421,9 +424,9 @@ class BaseVisits(AgentPart):
         return True
 
     def stay(self, base: BaseSpec, now_s: float) -> None:
-        """The vehicle has refused to take off from ``base``: it stands there still."""
+        """The vehicle has refused to take off from ``base``: it stands there still, as before."""
         if self._machine.take(Trigger.STANDS_AT_BASE):
-            self._stay(base, BaseStage.LANDED, now_s)
+            self._stay(base, self._left_from, now_s)
 
     def _stay(self, base: BaseSpec, stage: BaseStage, now_s: float) -> None:
         self._visit, self._on_ground = BaseVisit(), True

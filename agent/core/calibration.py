@@ -239,8 +239,12 @@ class FlightMeter(AgentPart):
 
     def depart_late(self) -> None:
         """The leg that was told last begins only now: its way was taken until then."""
-        if self._departure is not None:
-            self._departure = replace(self._departure, at_s=self._mission_view.now_s)
+        departure, me, now_s = self._departure, self._mission_view.me, self._mission_view.now_s
+        if departure is None:
+            return
+        self._departure = replace(departure, at_s=now_s)
+        if departure.climbs and me is not None:
+            self.sortie.depart(me, self._mission_view.mission_s(now_s))
 
     def arrive(self, leg: int, now_s: float) -> bool:
         """It is where that leg ends; whether the battery is to be looked at anew."""

@@ -25,8 +25,6 @@ class SortieClock:
     def __init__(self) -> None:
         self._counted_s: float | None = None
         """By the time since take-off [s]; None before the first one of this life."""
-        self._recalled = False
-        """Whether an earlier life counted so, by a drain that it may not have told."""
         self._measured_s = math.inf
         """By the charge that the vehicle told last [s]."""
         self._drain_frac = 1.0
@@ -62,27 +60,25 @@ class SortieClock:
             drain_frac: what it had told of its battery, and reckoned with.
         """
         if sortie_end_s is not None:
-            self._counted_s, self._drain_frac, self._recalled = sortie_end_s, drain_frac, True
+            self._counted_s, self._drain_frac = sortie_end_s, drain_frac
 
     def depart(self, me: UavSpec, mission_s: float) -> None:
         """It takes off with a full battery."""
         budget_s = _budget_s(me, 1.0) / self._drain_frac
         self._counted_s, self._measured_s = mission_s + budget_s, math.inf
-        self._recalled = False
 
     def land(self) -> None:
         """It stands at a base: nothing is used up."""
         self._counted_s, self._measured_s = math.inf, math.inf
-        self._recalled = False
 
     def heed(self, drain_frac: float, mission_s: float) -> None:
         """Its battery is found to drain so many times as fast as it should.
 
-        An earlier life may have counted with that already, before it told so: there the charge
-        alone says when the sortie ends sooner, if the vehicle tells it.
+        If the vehicle tells its charge, that says when the sortie ends sooner: an earlier life may
+        have counted with a faster drain before it told so, and slow legs cost nothing in a hover.
         """
         before, self._drain_frac = self._drain_frac, drain_frac
-        if self._recalled and self._measured_s < math.inf:
+        if drain_frac > before and self._measured_s < math.inf:
             return
         if before != drain_frac and self._counted_s is not None:
             left_s = self._counted_s - mission_s

@@ -36,6 +36,7 @@ class FieldTasking(Tasking):
     def __init__(self, context: AgentContext, make_rule: RuleMaker = rule_of) -> None:
         super().__init__(context, make_rule)
         self._sortie = self._flights.meter.sortie
+        context.airway.when_departed = self._depart_late
         self._visits = BaseVisits(context, self._flights, self._sortie, self._visit_over)
         self._limits = TimeLimits(context, self._flights, self._sortie)
         self._refused_bases = RefusedTasks(context.timing.reconsider_s)
@@ -44,9 +45,13 @@ class FieldTasking(Tasking):
         self._departed_from: str | None = None
         """The base that it has just been sent off from, until it has arrived anywhere."""
         self._drained = False
-        """Whether the battery was found to last less long, and nothing has followed yet."""
+        """Whether the battery was found to last otherwise, and nothing has followed yet."""
         self._home_at_s: float | None = None
         """When it has to fly home, if it finds nothing to do until then."""
+
+    def _depart_late(self) -> None:
+        self._flights.meter.depart_late()
+        self._drained = True
 
     # -- from without ------------------------------------------------------------------
 
@@ -156,9 +161,9 @@ class FieldTasking(Tasking):
                 self._visit_base(haven, now_s)
             self._depart_if_due(now_s)
             self._begin_if_due(now_s)
-            self._give_up_what_is_late(now_s)
             if self._drained:
                 self._drain(now_s)
+            self._give_up_what_is_late(now_s)
 
     def next_deadline_s(self) -> float | None:
         """When `advance` or `spent` will next have something to do."""
@@ -379,7 +384,7 @@ class FieldTasking(Tasking):
             self._release(why, now_s)
 
     def _drain(self, now_s: float) -> None:
-        """The battery lasts less long than was known: give up what can't be done on it."""
+        """The battery lasts otherwise than was known: give up what can't be done on it."""
         self._drained = False
         task, claim, state = self._task(), self.claim, self._machine.state
         works = state in (AgentState.FLYING, AgentState.SERVING)

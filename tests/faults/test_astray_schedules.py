@@ -14,6 +14,9 @@ BROKEN_ONCE = {
     5000176: "the judge asked for a slot's holder to be known that was cut off before it came",
     5002105: "who did not know enough to decide stayed in a new zone until it did",
     5000996: "who waited for a way set off on it when its battery did not last any more",
+    5003744: "a sortie was counted from when it was to take off, not from when its way was free",
+    5003806: "who stood beside the slots said that it stood on one when its way was refused",
+    5003941: "slow legs cost a UAV all of the time that it then spent in a hover as well",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

@@ -120,6 +120,27 @@ def test_a_later_life_does_not_count_again_what_the_earlier_one_had_measured_but
     assert later.end_s == 40.0
 
 
+def test_what_slow_legs_may_cost_counts_for_what_is_left_where_the_charge_is_told() -> None:
+    """Nothing of it is owed for a time that has passed in a hover meanwhile."""
+    sortie = SortieClock()
+    sortie.begin(ME, 0.0)
+    sortie.measure(ME, 1.0, 0.0)
+    sortie.heed(1.25, 0.0)
+    sortie.measure(ME, 1.0, 0.0)
+    assert sortie.end_s == 64.0  # 80 s above the reserve, as slowly as it flies
+
+    sortie.measure(ME, 0.4, 60.0)  # but as much as planned is left after a minute
+    assert sortie.end_s == 76.0
+
+
+def test_without_a_charge_that_is_told_what_slow_legs_cost_is_counted() -> None:
+    sortie = SortieClock()
+    sortie.begin(ME, 0.0)
+    sortie.heed(1.25, 0.0)
+
+    assert sortie.end_s == 64.0
+
+
 def test_a_sortie_that_drains_as_planned_is_as_it_was() -> None:
     sortie, plain = SortieClock(), SortieClock()
     for each in (sortie, plain):
