@@ -43,6 +43,7 @@ from swarm.separation.straight_pieces import off_piece_m
 from swarm.separation.tactical import Advice, Maneuver, OwnFlight, TacticalResolver
 from swarm.separation.tactical_rules import cell_around, cell_m, cells_near, rules_of
 from swarm.separation.tactical_traffic import (
+    SILENT_S,
     Grade,
     Precedence,
     TrafficPicture,
@@ -116,8 +117,10 @@ class NearTraffic(AgentPart):
         self._said_s = self._say_at_s = -math.inf
         self._pace_s = BEACON_S
         """Between two of its words, by its last decision."""
-        self._said: object = None
+        self._said: tuple[object, ...] = ()
         """What of its last word changes only with what it is told to do."""
+        self._turned_s = -math.inf
+        """When it first said that it flies otherwise than before."""
         self._grounded_since_s: float | None = None
         """When it was first seen on the ground, since it was in the air last."""
 
@@ -379,12 +382,14 @@ class NearTraffic(AgentPart):
             self._actions.append(TuneIn(cells))
 
     def _tell(self, own: OwnFlight, *, aloft: bool, now_s: float) -> None:
-        """Say where it is: at the pace of its last decision, and a tick after it said otherwise."""
+        """Say where it is: at the pace of its last decision, and of a turn as often as it may take
+        to be heard: words get lost, and others count on that one of them is not (`SILENT_S`)."""
         resolver, rules = self._resolver, self._rules
         if resolver is None or rules is None:
             return
         word = resolver.word(own)
         said = aloft, word.path_enu_m, word.speed_m_s, word.precedence
+        turns = said[:-1] != self._said[:-1]
         if said != self._said:
             self._say_at_s = min(self._say_at_s, self._said_s + rules.tick_s)
         if now_s < self._say_at_s:
@@ -395,8 +400,10 @@ class NearTraffic(AgentPart):
             self._grounded_since_s = now_s
         since_s = self._grounded_since_s
         is_long = since_s is not None and now_s - since_s >= _GROUNDED_S
+        self._turned_s = now_s if turns and aloft else self._turned_s
+        pace_s = rules.tick_s if aloft and now_s - self._turned_s < SILENT_S else self._pace_s
         self._said, self._said_s = said, now_s
-        self._say_at_s = now_s + (_GROUNDED_S if is_long else self._pace_s)
+        self._say_at_s = now_s + (_GROUNDED_S if is_long else pace_s)
         place = word.position_enu_m
         self._say(
             Nearby(

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from itertools import pairwise
 
 import pytest
 
+from agent.core.interface import GoTo
 from agent.vehicle.config import CommandStyle
 from sim.autopilot.firmware import FirmwareModelName
 from sim.world.engine import Process
@@ -19,52 +21,39 @@ KIND = (FirmwareModelName.ARDUPILOT, CommandStyle.REPOSITION)
 
 
 class Words:
-    """By UAV, when it said where it is [s], and what it said."""
+    """What a fleet's UAVs said of where they are; a `WorldListener`."""
 
     def __init__(self) -> None:
-        self.said: dict[str, list[tuple[float, Nearby]]] = defaultdict(list)
+        self.of: dict[str, list[tuple[float, Nearby]]] = defaultdict(list)
+        """By UAV, in order, each with when it was said [s]."""
         self.fleet: CrossingFleet | None = None
 
-    def said_by(self, uav: str, since_s: float, until_s: float) -> int:
+    def count(self, uav: str, since_s: float, until_s: float) -> int:
         """How many within that time."""
-        return sum(since_s <= at_s < until_s for at_s, _ in self.said[uav])
+        return sum(since_s <= at_s < until_s for at_s, _ in self.of[uav])
 
-    def aloft(self, uav: str) -> tuple[float, float]:
-        """When it first and last said that it is in the air."""
-        instants_s = [at_s for at_s, word in self.said[uav] if word.airborne]
-        return instants_s[0], instants_s[-1]
-
-    # -- WorldListener ------------------------------------------------------------------
-
-    def said_now(self, process: Process, message: Message) -> None:
+    def said(self, process: Process, message: Message) -> None:
         if isinstance(message.body, Nearby) and self.fleet is not None:
-            now_s = self.fleet.world.queue.now_s()
-            self.said[process.name].append((now_s, message.body))
+            self.of[process.name].append((self.fleet.world.queue.now_s(), message.body))
+
+    def stepped(self, process: Process) -> None:
+        pass
+
+    def raised(self, process: Process, fault: Exception) -> None:
+        raise fault
+
+    def refused(self, process: Process, order: GoTo) -> None:
+        pass
+
+    def noted(self, process: Process, note: LogLine) -> None:
+        pass
 
 
 def flown(
     monkeypatch: pytest.MonkeyPatch, *ways: tuple[tuple[float, float], tuple[float, float]]
 ) -> Words:
-    words = Words()
-
-    class Listener:
-        def said(self, process: Process, message: Message) -> None:
-            words.said_now(process, message)
-
-        def stepped(self, process: Process) -> None:
-            pass
-
-        def raised(self, process: Process, fault: Exception) -> None:
-            raise fault
-
-        def refused(self, process: Process, order: object) -> None:
-            pass
-
-        def noted(self, process: Process, note: LogLine) -> None:
-            pass
-
-    mission = mission_of(*ways, band_m=(20.0, 60.0))
-    words.fleet = CrossingFleet(monkeypatch, *KIND, mission, planned=True, watch=Listener())
+    words, mission = Words(), mission_of(*ways, band_m=(20.0, 60.0))
+    words.fleet = CrossingFleet(monkeypatch, *KIND, mission, planned=True, watch=words)
     words.fleet.fly(300.0)
     words.fleet.assert_all_done()
     return words
@@ -75,9 +64,9 @@ def test_who_climbs_beside_others_speaks_once_a_second(monkeypatch: pytest.Monke
     row = flown(monkeypatch, *(((14.0 * n, 0.0), (14.0 * n, 40.0)) for n in range(4)))
 
     for uav in ("u0", "u1", "u2", "u3"):
-        leaves_s = next(at_s for at_s, word in row.said[uav] if word.position_enu_m[2] > 1.0)
+        leaves_s = next(at_s for at_s, word in row.of[uav] if word.position_enu_m[2] > 1.0)
         climbs_s = leaves_s + SILENT_S + 0.5  # until then it may not have been heard
-        assert 2 <= row.said_by(uav, climbs_s, climbs_s + 3.0) <= 4, row.said[uav]
+        assert 2 <= row.count(uav, climbs_s, climbs_s + 3.0) <= 4, row.of[uav]
 
 
 def test_who_comes_near_another_one_speaks_four_times_as_often(
@@ -87,8 +76,8 @@ def test_who_comes_near_another_one_speaks_four_times_as_often(
     words = flown(monkeypatch, ((-80.0, 0.0), (80.0, 3.0)), ((80.0, 3.0), (-80.0, 0.0)))
 
     for uav in ("u0", "u1"):
-        busiest = max(words.said_by(uav, float(at_s), at_s + 4.0) for at_s in range(10, 60))
-        assert 14 <= busiest <= 17, words.said[uav]
+        busiest = max(words.count(uav, float(at_s), at_s + 4.0) for at_s in range(10, 60))
+        assert 14 <= busiest <= 17, words.of[uav]
 
 
 def test_who_stands_on_the_ground_for_long_says_so_every_ten_seconds(
@@ -97,8 +86,25 @@ def test_who_stands_on_the_ground_for_long_says_so_every_ten_seconds(
     """As the last of five does that start side by side, one after the other."""
     words = flown(monkeypatch, *(((3.0 * n, 0.0), (-60.0 + 40.0 * n, 60.0)) for n in range(5)))
 
-    last = max(words.said, key=lambda uav: words.aloft(uav)[0])
-    waited_s = words.aloft(last)[0] - words.said[last][0][0]
+    def aloft_s(uav: str) -> float:
+        return next(at_s for at_s, word in words.of[uav] if word.airborne)
+
+    last = max(words.of, key=aloft_s)
+    waited_s = aloft_s(last) - words.of[last][0][0]
     assert waited_s > 25.0
-    on_ground = sum(not word.airborne for _, word in words.said[last])
-    assert 11 <= on_ground <= 13 + (waited_s - 10.0) / 10.0, words.said[last]
+    on_ground = sum(not word.airborne for _, word in words.of[last])
+    assert 11 <= on_ground <= 13 + (waited_s - 10.0) / 10.0, words.of[last]
+
+
+def test_a_turn_is_said_each_tick_until_it_has_surely_been_heard(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Of one that nobody is near."""
+    words = flown(monkeypatch, ((0.0, 0.0), (90.0, 0.0)), ((0.0, 400.0), (90.0, 400.0)))
+
+    told = [(at_s, word.path_enu_m) for at_s, word in words.of["u0"] if word.airborne]
+    turns_s = [at_s for (_, before), (at_s, path) in pairwise(told) if path != before]
+    assert len(turns_s) >= 2, "to its task, and home"
+    for at_s in turns_s[:2]:
+        assert words.count("u0", at_s, at_s + SILENT_S) >= 11, words.of["u0"]
+        assert words.count("u0", at_s + SILENT_S + 0.5, at_s + SILENT_S + 4.5) <= 5
