@@ -10,7 +10,7 @@ the ground takes longer. What takes longer than was known is believed at once.
 **A leg** counts from departure, at rest in the air, to arrival, where it was predicted to take
 `_SHORTEST_S` or more. One that was broken off, held, diverted or flown on another way does not, nor
 one that began on the ground. **The drain** counts over each
-`_SPAN_FRAC` of the charge used in one flight, hovering included.
+4 % of the charge used in one flight, hovering included (`DrainGauge`).
 
 Each of these two is a share of the prediction by brief and parameters, and has one vote among the
 last `_WINDOW` in a running median, which begins with `_PRIOR` votes for what is known already. So
@@ -34,7 +34,7 @@ from statistics import median
 from typing import Final
 
 from agent.core.context import AgentContext, AgentPart
-from agent.core.energy import SortieClock
+from agent.core.energy import DrainGauge, SortieClock
 from agent.core.interface import FlightLimits
 from agent.core.states import AgentState
 from swarm.protocol.calibration import (
@@ -54,9 +54,6 @@ STEP_S: Final = 1.0
 """Least change of the times of landing and climbing that is told [s]."""
 _PRIOR, _WINDOW = 2, 9
 _SHORTEST_S: Final = 3.0
-_SPAN_FRAC: Final = 0.04
-_RISE_FRAC: Final = 0.005
-"""Charge that goes up by more is another battery, or one that has recovered: a new span."""
 
 
 class RunningMedian:
@@ -130,8 +127,7 @@ class FlightMeter(AgentPart):
         """Whether it is about to take off."""
         self._lands_since_s: float | None = None
         """When it was told to land, in the air."""
-        self._span: tuple[float, float] | None = None
-        """When the charge was what, at the beginning of what is being measured."""
+        self._gauge = DrainGauge()
 
     @property
     def cautious_drain_frac(self) -> float:
@@ -188,7 +184,8 @@ class FlightMeter(AgentPart):
 
     def land(self) -> None:
         """It is on the ground, or about to land."""
-        self._departure, self._at_rest, self._span = None, False, None
+        self._departure, self._at_rest = None, False
+        self._gauge.begin()
         self._stands, self._lands_since_s = False, None
 
     def come_down(self, now_s: float) -> None:
@@ -278,15 +275,10 @@ class FlightMeter(AgentPart):
     ) -> bool:
         if endurance_s is None or battery_frac is None:
             return False
-        if self._span is None or battery_frac > self._span[1] + _RISE_FRAC:
-            self._span = now_s, battery_frac
+        used_1_s = self._gauge.read(battery_frac, now_s)
+        if used_1_s is None:
             return False
-        since_s, before_frac = self._span
-        used_frac, flown_s = before_frac - battery_frac, now_s - since_s
-        if used_frac < _SPAN_FRAC or flown_s <= 0.0:
-            return False
-        self._span = now_s, battery_frac
-        drain_frac = used_frac * endurance_s / flown_s
+        drain_frac = used_1_s * endurance_s
         return self._vote(self._medians.drains, drain_frac, DRAIN_FRAC_RANGE, now_s)
 
     # -- what comes of it --------------------------------------------------------------

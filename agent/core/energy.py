@@ -3,6 +3,9 @@
 Energy is airborne time. A sortie begins at mission time 0, or when the UAV takes off from a base
 with a full battery, and has ended when it has landed; the reserve is never planned with. Leaves
 out: where it lands (agent.core.flights) and what follows if it must (agent.core.field_tasking).
+
+Charge is told in steps, of 1 % in BATTERY_STATUS
+(https://mavlink.io/en/messages/common.html#BATTERY_STATUS), and some time after it is so.
 """
 
 from __future__ import annotations
@@ -17,6 +20,11 @@ TOLERANCE_S: Final = 1e-6
 _MEASURED_EARLIER_S: Final = 1.0
 """What the battery says counts where it ends the sortie by more than that earlier: less is how
 finely it is told."""
+_SPAN_FRAC: Final = 0.04
+_SPAN_S: Final = 20.0
+"""A drain is measured over no less of the charge, and no less time: words come some time late."""
+_RISE_FRAC: Final = 0.005
+"""Charge that goes up by more is another battery, or one that has recovered: a new span."""
 
 
 class SortieClock:
@@ -92,6 +100,41 @@ class SortieClock:
         left_s = (battery_frac - me.reserve_frac) * me.endurance_s
         self._measured_s = mission_s + left_s / self._drain_frac
         return self.end_s < before_s - TOLERANCE_S
+
+
+class DrainGauge:
+    """Measures how fast one battery drains in flight, over spans of its charge."""
+
+    def __init__(self) -> None:
+        self._told_frac: float | None = None
+        """What was told last; None before the first word of a flight."""
+        self._since: tuple[float, float] | None = None
+        """When the span began, and with what charge; None before the charge has fallen."""
+
+    def begin(self) -> None:
+        """A flight begins, or ends: what was told before is of no use."""
+        self._told_frac, self._since = None, None
+
+    def read(self, battery_frac: float, now_s: float) -> float | None:
+        """Take what is told now [1, s]; gives the charge used per second, once that is known [1/s].
+
+        A span begins and ends where the charge that is told falls: in between, up to a step of it
+        may have been used already.
+        """
+        before_frac, self._told_frac = self._told_frac, battery_frac
+        if before_frac is None or battery_frac > before_frac + _RISE_FRAC:
+            self._since = None
+            return None
+        if battery_frac >= before_frac:
+            return None
+        if self._since is None:
+            self._since = now_s, battery_frac
+            return None
+        used_frac, flown_s = self._since[1] - battery_frac, now_s - self._since[0]
+        if used_frac < _SPAN_FRAC - 1e-9 or flown_s < _SPAN_S:
+            return None
+        self._since = now_s, battery_frac
+        return used_frac / flown_s
 
 
 def _budget_s(me: UavSpec, charge_frac: float) -> float:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from agent.core.calibration import STEP_FRAC, RunningMedian, told_anew
-from agent.core.energy import SortieClock
+from agent.core.energy import DrainGauge, SortieClock
 from swarm.protocol.calibration import TIME_FRAC_RANGE
 from swarm.protocol.messages import UavSpec
 
@@ -147,3 +147,40 @@ def test_a_sortie_that_drains_as_planned_is_as_it_was() -> None:
         each.begin(ME, 3.1)
     sortie.heed(1.0, 7.7)
     assert sortie.end_s == plain.end_s
+
+
+@given(
+    endurance_s=st.floats(60.0, 3000.0),
+    drain_frac=st.floats(0.5, 2.0),
+    phase_s=st.floats(0.0, 30.0),
+    data=st.data(),
+)
+def test_a_drain_is_measured_whatever_the_steps_in_which_charge_is_told(
+    endurance_s: float, drain_frac: float, phase_s: float, data: st.DataObject
+) -> None:
+    """Told in whole per cent, twice a second and up to a second late: at most 10 % off."""
+    gauge = DrainGauge()
+    late_s = data.draw(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8))
+    votes, told_at_s = [], phase_s
+    for step in range(400):
+        now_s = phase_s + 0.5 * step
+        told_at_s = max(told_at_s, now_s - late_s[step % len(late_s)])
+        left_frac = 1.0 - told_at_s * drain_frac / endurance_s
+        used_1_s = gauge.read(math.ceil(100.0 * left_frac) / 100.0, now_s)
+        votes += [] if used_1_s is None else [used_1_s * endurance_s]
+
+    assert votes or 200.0 * drain_frac / endurance_s < 0.06 or endurance_s / drain_frac < 30.0
+    assert all(abs(vote / drain_frac - 1.0) < 0.1 for vote in votes), votes
+
+
+def test_a_drain_is_measured_anew_in_each_flight_and_with_each_battery() -> None:
+    gauge = DrainGauge()
+    used_1_s = [gauge.read(frac, at_s) for at_s, frac in ((0.0, 0.9), (1.0, 0.89), (41.0, 0.81))]
+    assert used_1_s == [None, None, pytest.approx(0.002)]
+
+    assert gauge.read(1.0, 50.0) is None  # another battery
+    assert gauge.read(0.9, 80.0) is None  # the first that it tells of a fall
+    assert gauge.read(0.8, 105.0) == pytest.approx(0.004)
+    gauge.begin()
+    assert gauge.read(0.7, 130.0) is None
+    assert gauge.read(0.6, 155.0) is None
