@@ -218,15 +218,15 @@ class Tasking(AgentPart, ABC):
         served_at_s, task = self._attempt.served_at_s, self._task()
         if served_at_s is None or served_at_s > now_s or task is None:
             return
-        mission_s = self._mission_view.mission_s(now_s)
+        ended_s = self._mission_view.mission_s(served_at_s)  # before it hung, perhaps
         result = AttemptResult.FAILED if self._attempt.fails else AttemptResult.DONE
         way = None if self.claim is None else self.claim.reversed
-        outcome = Outcome(task.task, result, self._attempt_at(task.task), mission_s, way)
+        outcome = Outcome(task.task, result, self._attempt_at(task.task), ended_s, way)
         # The next claim, made in this same step, replaces the old one on the bus.
         self._machine.take(Trigger.SERVED)
-        self._become_free(mission_s)
+        self._become_free(self._mission_view.mission_s(now_s))
         self._say(outcome)
-        self._note(f"task {result}", task.task, mission_s=mission_s)
+        self._note(f"task {result}", task.task, mission_s=ended_s)
 
     def _keep_or_lose_claim(self, now_s: float) -> None:
         claim, attempt = self.claim, self._attempt

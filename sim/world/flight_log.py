@@ -28,8 +28,11 @@ from sim.world.motion import Point
 from sim.world.track import Track
 from swarm.model import BaseId, Mission, UavId
 from swarm.model.plan import START, ScheduleEntry, at_base
+from swarm.protocol.uav_messages import Outcome
 
 _SAME_BASE_M = 1.0
+_HELD_UP_S = 1.0
+"""Whose agent says that an attempt ended longer ago than that, it hung: no clock is so far off."""
 
 _MapPoint = tuple[float, float]
 
@@ -187,9 +190,10 @@ class FlightLog:
         for stay in self._here(uav):
             stay.end_s = now_s
 
-    def attempt_ended(self, uav: str, task: str, attempt: int, now_s: float, zero_s: float) -> None:
-        """An attempt at a task is over, which may be said again."""
-        flown = self._flown[uav]
+    def attempt_ended(self, uav: str, ended: Outcome, now_s: float, zero_s: float) -> None:
+        """An attempt at a task is over, which may be said again, or long after it was so."""
+        flown, task, attempt = self._flown[uav], ended.task, ended.attempt
+        ended_s = zero_s + ended.completed_s
         leg = flown.left.pop((task, attempt), None)
         if flown.open is not None and (flown.open.task, flown.open.attempt) == (task, attempt):
             leg, flown.open = flown.open, None
@@ -199,7 +203,8 @@ class FlightLog:
         opens_s = 0.0 if known is None else zero_s + known.opens_s
         if leg.begin_s is None:
             leg.begin_s = max(leg.arrive_s, opens_s) if opens_s > zero_s else leg.arrive_s
-        flown.entries.append(_entry(leg, now_s))
+        held_up = leg.begin_s <= ended_s < now_s - _HELD_UP_S
+        flown.entries.append(_entry(leg, ended_s if held_up else now_s))
 
     def executed_schedule(self, zero_s: float | None) -> dict[UavId, tuple[ScheduleEntry, ...]]:
         """Every UAV's list, in mission time, which begins at ``zero_s``.

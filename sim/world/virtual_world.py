@@ -341,8 +341,8 @@ class World:
         if isinstance(message.body, Claim) and message.body.stage is BaseStage.PARKED:
             self.flight_log.made_room(process.name, self.queue.now_s())
         elif isinstance(message.body, Outcome) and message.writer == process.name:
-            ended, times_s = message.body, (self.queue.now_s(), self.zero_s or 0.0)
-            self.flight_log.attempt_ended(process.name, ended.task, ended.attempt, *times_s)
+            times_s = self.queue.now_s(), self.zero_s or 0.0
+            self.flight_log.attempt_ended(process.name, message.body, *times_s)
         elif isinstance(message.body, Status):
             message = replace(message, body=self._as_flown(process.name, message.body))
         self.network.publish(process, message)

@@ -35,6 +35,7 @@ from sim.world.uncertainty import Uncertainty
 from swarm.model import Base, BaseId, Mission, Task, TaskId, Uav, UavId
 from swarm.model.layers import FlightLayers
 from swarm.model.plan import Schedule, ScheduleEntry
+from swarm.protocol.uav_messages import AttemptResult, Outcome
 from swarm.runtime.clock import SystemClock
 from tests.support.field_missions import mission_of
 from tests.support.field_oracle.made_up import made_up
@@ -364,9 +365,10 @@ class ScriptedPilot:
         self.flight.queue.at(time_s, do)
 
     def end_attempt(self) -> None:
-        ended = (self.uav, self.entries[self.number].go, 1)
+        now_s = self.flight.queue.now_s()
+        ended = Outcome(self.entries[self.number].go, AttemptResult.DONE, 1, now_s)
         self.depart()  # agents order first, too
-        self.flight.log.attempt_ended(*ended, self.flight.queue.now_s(), 0.0)
+        self.flight.log.attempt_ended(self.uav, ended, now_s, 0.0)
 
     def depart(self) -> None:
         self.number += 1

@@ -5,6 +5,7 @@ from __future__ import annotations
 from agent.core.interface import Arrived, GoTo, Telemetry
 from sim.world.flight_log import FlightLog
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
+from swarm.protocol.uav_messages import AttemptResult, Outcome
 
 LINE = ((100.0, 0.0, 0.0), (100.0, 50.0, 0.0), (100.0, 200.0, 0.0))
 MISSION = Mission(
@@ -32,9 +33,21 @@ def test_a_line_begins_when_it_is_flown_not_when_its_first_end_is_ordered_again(
     along = GoTo(2, LINE[2], task="line", via_enu_m=(LINE[1],))
     log.ordered("u0", along, at(LINE[0]), 30.0)
     log.reported("u0", Arrived(2), 50.0)
-    log.attempt_ended("u0", "line", 1, 50.0, 0.0)
+    log.attempt_ended("u0", Outcome("line", AttemptResult.DONE, 1, 50.0), 50.0, 0.0)
 
     (entry,) = log.executed_schedule(0.0)[UavId("u0")]
     times_s = entry.depart_s, entry.arrive_s, entry.begin_s, entry.end_s
     assert times_s == (0.0, 10.0, 30.0, 50.0)
     assert not entry.is_reversed
+
+
+def test_an_attempt_of_which_is_told_late_ended_when_it_did() -> None:
+    """Its agent hung in between; a clock that is a little slow is no reason."""
+    for completed_s, end_s in ((45.0, 52.0), (52.6, 60.0), (53.0, 60.0)):
+        log = FlightLog(MISSION, {})
+        log.ordered("u0", GoTo(1, LINE[0], task="line"), at((0.0, 0.0, 0.0)), 7.0)
+        log.reported("u0", Arrived(1), 40.0)
+        log.attempt_ended("u0", Outcome("line", AttemptResult.DONE, 1, completed_s), 60.0, 7.0)
+
+        (entry,) = log.executed_schedule(0.0)[UavId("u0")]
+        assert entry.end_s == end_s
