@@ -30,6 +30,7 @@ from sim.world.virtual_world import World
 from swarm.allocation.field import problem_of
 from swarm.model import Mission, Zone
 from swarm.separation.fleet_layers import fleet_layers_m
+from swarm.separation.slabs import shared_layers_m
 
 if TYPE_CHECKING:
     import shapely
@@ -56,6 +57,8 @@ class VehicleFlaw:
 
 REACTION_S = 5.0
 """Until when who hears of a zone has ordered its way out [s]."""
+_GRANTED_S = 5.0
+"""Who has no way out of a zone after that where UAVs are kept apart lands (swarm/separation)."""
 
 
 def _all_is_heard(_one: str, _other: str, _since_s: float, _until_s: float) -> bool:
@@ -76,6 +79,8 @@ class FieldJudge:
     or, if it has to ask others first what it has missed, when they have answered: at the latest
     ``reaction_s`` later. Then its vehicle stops, and flies the shortest way out from rest; see
     `_leaves_s` for how long that takes. A vehicle that refuses that way gives it as long again.
+    Where UAVs are kept apart its way has to be granted first, and may lead through any layer: it
+    waits 5 s for that at most, and climbs or sinks on its way out.
 
     Whose words reach each other nowhere from when one stands at a base until the other comes down
     there cannot share its slots out: a base says nothing, and neither can wait for words that may
@@ -152,8 +157,11 @@ class FieldJudge:
         stops_s = 0.0 if a_m_s2 is None else row.speed_m_s / a_m_s2
         out_m = float(shapely.distance(shapely.boundary(forbidden), shapely.Point(place[:2])))
         out_m += row.speed_m_s * (stops_s / 2.0 + self.stale_s) + self.astray_m
+        waits_s = 0.0
+        if self.world.mission.separation_m is not None:
+            waits_s, out_m = _GRANTED_S, out_m + _heights_m(self.world.mission)
         takes_s = flown_s(out_m, speed_m_s, a_m_s2) / _slowest(self.flaws, uav)
-        return since_s + stops_s + takes_s
+        return since_s + waits_s + stops_s + takes_s
 
     # -- times --------------------------------------------------------------------------
 
@@ -188,6 +196,16 @@ class FieldJudge:
                 )
                 if len(here) > (base.slots or 0):
                     yield f"{', '.join(here)} stand at {base.id} at {stay.begin_s:.3f} s"
+
+
+def _heights_m(mission: Mission) -> float:
+    """Between the lowest and the highest layer above any place that is visited [m]."""
+    separation_m = mission.separation_m or 0.0
+    layers_m = shared_layers_m(separation_m, len(mission.uavs), mission.band_m, 0.0)
+    up_m = [place[2] for task in mission.tasks for place in (task.position_enu_m, *task.path_enu_m)]
+    up_m += [place.position_enu_m[2] for place in (*mission.uavs, *mission.bases)]
+    up_m += [task.height_m for task in mission.tasks if task.height_m is not None]
+    return layers_m[-1] - layers_m[0] + max(up_m) - min(up_m)
 
 
 def _slowest(flaws: Iterable[VehicleFlaw], uav: str) -> float:

@@ -269,6 +269,20 @@ def test_who_is_in_a_zone_has_as_long_as_its_shortest_way_out_takes(
     assert [each for each, _ in complaints] == ([] if is_sound else ["in a zone"])
 
 
+@pytest.mark.parametrize(("out_s", "is_sound"), [(10.9, True), (11.1, False)])
+def test_where_uavs_are_kept_apart_a_way_out_is_granted_first_and_may_climb(
+    out_s: float, is_sound: bool
+) -> None:
+    """5 s until it is granted, 10 m out and 50 m up at 10 m/s."""
+    world = on_a_way((0.0, 100.0, 0.0), (25.0, 100.0, 0.0), (25.0 + out_s, 110.01, 0.0))
+    uavs = (replace(MISSION.uavs[0], position_enu_m=(0.0, 20.0, 0.0)), *MISSION.uavs[1:])
+    apart = replace(MISSION, uavs=uavs, separation_m=8.0, band_m=(30.0, 80.0))
+    world.mission = apart
+    complaints = FieldJudge(world).complaints([DRAWN])
+
+    assert [each for each, _ in complaints] == ([] if is_sound else ["in a zone"])
+
+
 SEEN = LastSeen(5.0, (10.0, 0.0, 10.0), 0.9, True)
 NEAR = Task(TaskId("near"), (50.0, 0.0, 0.0), 1.0)
 CHARGED = replace(MISSION.uavs[0], position_enu_m=(0.0, 0.0, 0.0), charge_frac=1.0)
