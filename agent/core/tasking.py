@@ -141,6 +141,7 @@ class Tasking(AgentPart, ABC):
         """The UAV gives its task up, and takes none before it `begin`s anew."""
         task = self._task()
         self._withdraw(ClaimPhase.PAUSED, now_s, handed_over=False)
+        self._free.adrift = True  # where it is held is somewhere on its way
         if task is not None:
             self._note("released", task.task, reason="the UAV is held")
 

@@ -333,7 +333,7 @@ class Chances:
             legs_s = self._legs_from_s(row, seen)
             best_s = self._work_s(row, column, legs_s, now_s, left_s, landed=False)
             to_s = legs_s[problem.n_uav : problem.n_uav + problem.n_base]
-            there = (to_s <= left_s + 1e-6) & self._swaps & (visits > 0)
+            there = (to_s <= left_s - self._slack_s) & self._swaps & (visits > 0)
             ready_s[there] = now_s + to_s[there] + problem.swap_s[there]
         elif base is not None:
             ready_s[base] = now_s
@@ -341,7 +341,7 @@ class Chances:
             for here in np.flatnonzero(np.isfinite(ready_s)).tolist():
                 legs_s = problem.leg_s[problem.kind[row], problem.n_uav + here]
                 to_s = legs_s[problem.n_uav : problem.n_uav + problem.n_base]
-                there = (to_s <= problem.full_s[row] + 1e-6) & self._swaps
+                there = (to_s <= problem.full_s[row] - self._slack_s) & self._swaps
                 later_s = ready_s[here] + to_s + problem.swap_s
                 ready_s = np.where(there, np.minimum(ready_s, later_s), ready_s)
         for here in np.flatnonzero(np.isfinite(ready_s)).tolist():
@@ -382,11 +382,15 @@ class Chances:
         """Times of legs from there [s].
 
         Who is kept apart in the layer of somebody else flies level there, and upright at the
-        height of its task, as if it was in its own layer: no slanted way is granted to it.
+        height of its task, as if it was in its own layer: no slanted way is granted to it. Who may
+        hover at a task's own height has that far to climb or sink, as plans know no layers.
         """
         east_m, north_m, up_m = seen.place_enu_m
         place = (east_m, north_m, up_m - self._layers_m[row])
         legs_s = self._problem.legs_from_s(row, place, flown_m=up_m)
+        if any(task.height_m is not None for task in self._mission.tasks):
+            high_s = self._problem.legs_from_s(row, seen.place_enu_m, flown_m=up_m)
+            legs_s = np.maximum(legs_s, high_s)
         if self._mission.separation_m is None:
             return legs_s
         return np.maximum(legs_s, self._problem.legs_from_s(row, (east_m, north_m, 0.0)))

@@ -17,6 +17,11 @@ BROKEN_ONCE = {
     5003744: "a sortie was counted from when it was to take off, not from when its way was free",
     5003806: "who stood beside the slots said that it stood on one when its way was refused",
     5003941: "slow legs cost a UAV all of the time that it then spent in a hover as well",
+    5004105: "who had been held on its way, and found nothing to do, made room for nobody",
+    5006078: "an agent that hung told the end of its service when it woke",
+    5004270: "the judge allowed no climb on the way out of a zone",
+    5005804: "the judge allowed no time for a way out of a zone to be granted",
+    5010244: "the judge took the height of a task for one above the layers",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

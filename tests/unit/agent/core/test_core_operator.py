@@ -143,6 +143,20 @@ def test_resumed_it_is_prepared_where_it_is_and_decides_anew() -> None:
     assert [type(order) for order in orders(actions)] == [GoTo]
 
 
+def test_resumed_with_nothing_to_do_it_hovers_where_it_was_held() -> None:
+    agent = on_its_way()
+    tell(agent, HOLD, 2.0)
+    agent.be_at((2.0, 0.0, 10.0))
+    for number, name in enumerate(("near", "far")):
+        agent.post(entry(name, 5.0, number=number, withdrawn=True))
+    tell(agent, RESUME, 20.0)
+
+    (order,) = orders(agent.happen(VehicleReady(), 21.0))
+    assert isinstance(order, GoTo)
+    assert order.position_enu_m == (2.0, 0.0, 10.0)
+    assert agent.phase is ClaimPhase.IDLE
+
+
 def test_resuming_who_is_not_held_changes_nothing() -> None:
     agent = on_its_way()
 
