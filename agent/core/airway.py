@@ -204,9 +204,9 @@ class Airway:
             return
         fixed |= self._rises
         corners = self._fleet.corners(order, here)
-        # Home, a vehicle goes down to its own layer above its start by itself.
-        own_height |= isinstance(order, Return) and not order.land
+        own_height |= self._fleet.keeps_height(order, corners[-1])
         high = self._own_height if self._moves else self._at_own_height
+        high |= self._fleet.layer.misses(here)
         wished = order, self._mission_view.now_s, corners, own_height, fixed, high, takes_s
         self._wish = Wish(*wished)
         self._aside = None
@@ -417,9 +417,9 @@ class Airway:
             return False
         if not self._fleet.is_in_the_way(air, here, claims, waits=self._wish is not None):
             return False
-        high, corner = self._at_own_height, self._nominal(here.path_enu_m[0])
-        if high:  # layers count from the ground, and not from the height of a task
-            corner = self._fleet.in_own_layer(corner)
+        corner = self._nominal(here.path_enu_m[0])
+        if high := self._at_own_height or self._fleet.layer.misses(corner):
+            corner = self._fleet.layer.above(corner)
         self._aside = Wish(GoTo(STOP_LEG, corner), now_s, (corner,), out_of_layer=high)
         return True
 

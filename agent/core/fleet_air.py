@@ -14,6 +14,7 @@ import numpy as np
 
 from agent.core.interface import GoTo, Prepare, Return
 from agent.core.mission_view import MissionView, Peers
+from agent.core.own_layer import OwnLayer
 from agent.core.zone_stay import ZoneStay
 from swarm.allocation.problem import rest_to_rest_s
 from swarm.protocol.calibration import FlightRates
@@ -123,6 +124,7 @@ class FleetAir:
         self._lost_s: dict[str, float] = {}
         """Who is lost, and since when [s mission time]."""
         self._zone_stay = ZoneStay(uav, replica, mission_view)
+        self.layer = OwnLayer(replica, mission_view)
 
     @property
     def shared(self) -> SharedAir | None:
@@ -162,6 +164,16 @@ class FleetAir:
             if not order.land and me is not None:
                 corners.append(self._mission_view.in_layer(me.position_enu_m))
         return thinned(corners, MOST_CORNERS - _TURNS)
+
+    def keeps_height(self, order: GoTo | Return | Prepare, end_enu_m: Point) -> bool:
+        """Whether ``order`` ends there at that very height, in whatever layer it is flown [m].
+
+        Home, a vehicle goes down to its own layer above its start by itself; and who is to stop
+        where it has left its layer stays as high as it is.
+        """
+        if isinstance(order, GoTo):
+            return self.layer.misses(end_enu_m)
+        return isinstance(order, Return) and not order.land
 
     def ways(
         self, air: SharedAir, wish: Wish, now_shift_m: float, *, aside: bool
@@ -249,19 +261,6 @@ class FleetAir:
                 fallback = slabs, asked
         return None if fallback is None else FoundWay(fallback[1], is_free=False)
 
-    def in_own_layer(self, place_enu_m: Point) -> Point:
-        """Above that place or below it, in the own layer [m]."""
-        east_m, north_m, up_m = place_enu_m
-        me, brief = self._mission_view.me, self._brief
-        if me is None or brief is None:
-            return place_enu_m
-        up_m = me.layer_m
-        if brief.terrain is not None:
-            from swarm.allocation.legs.ground import ground_of
-
-            up_m += ground_of(brief.terrain.terrain()).one_up_m(east_m, north_m)
-        return east_m, north_m, up_m
-
     def begin_at(self, wish: Wish, place_enu_m: Point) -> None:
         """The UAV, which has made room, waits there for its way [m; in its own layer].
 
@@ -344,7 +343,7 @@ class FleetAir:
         out_m, (here, *rest) = self._zone_stay.out_m(), wish.corners_enu_m
         if out_m is None or wish.fixed or not rest or self._zone_stay.lasts_s(here) < retry_s:
             return None
-        there = self.in_own_layer(out_m)
+        there = self.layer.above(out_m)
         is_next = math.dist(there[:2], rest[0][:2]) < _BESIDE_M
         if (len(rest) == 1 and is_next) or not (is_next or self._is_clear(there, rest[0])):
             return None

@@ -254,12 +254,14 @@ class Flights(AgentPart):
         return HomeFlight((), end_enu_m, None, duration_s, self._lands_by_itself)
 
     def way_out(self) -> Point | None:
-        """Where the UAV leaves the zone that it is in, in its layer; None: it is in none."""
+        """Where the UAV leaves the zone that it is in, as high as it flies; None: it is in none."""
         problem, place_enu_m = self.problem, self._mission_view.place_enu_m
         if problem is None or problem.network is None or place_enu_m is None:
             return None
         out_m = problem.network.way_out_m(self._row(problem), place_enu_m)
-        return None if out_m is None else self._mission_view.in_layer(out_m)
+        if out_m is None or self._mission_view.flown_m is not None:
+            return out_m
+        return self._mission_view.in_layer(out_m)
 
     def _way(self, node: int) -> field.Way | None:
         problem, place_enu_m = self.problem, self._mission_view.place_enu_m

@@ -1,6 +1,7 @@
 """What must hold of a mission in the field, by where its vehicles truly were and what they did.
 
 - *fell*: nobody runs out of energy in the air;
+- *underground*: without hills, nobody flies lower than the lowest place that is visited;
 - *in a zone*: nobody flies in a zone at its heights, or nearer to it than the margin; who is in one
   that is drawn over it leaves in time, and does not come back;
 - *out of its window*: no work that is done has begun before it opens, or after it closes, or ends
@@ -41,6 +42,8 @@ _SLACK_M = 1e-3
 _MARGIN_SLACK_FRAC = 1e-3
 """Chains of chords in the place of round corners."""
 _SAME_BASE_M = 1.0
+_LOW_M = 0.5
+"""Who is no lower than that is on the ground."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,10 +113,21 @@ class FieldJudge:
             zones = [DrawnZone(zone) for zone in self.world.mission.zones]
         return [
             *(("fell", f"{uav} at {at_s:.3f} s") for uav, at_s in self.world.fallen_s.items()),
+            *(("underground", text) for text in self._descents()),
             *(("in a zone", text) for text in self._intrusions(zones)),
             *(("out of its window", text) for text in self._out_of_windows()),
             *(("no slot", text) for text in self._crowds()),
         ]
+
+    def _descents(self) -> Iterable[str]:
+        mission = self.world.mission
+        low_m = min(_heights_m(mission)) - self.astray_m - _LOW_M
+        for uav, track in self.world.tracks.items() if mission.terrain is None else ():
+            for piece in track.pieces():
+                begin_s, up_m = piece.begin_s, piece.position_enu_m(piece.begin_s)[2]
+                if up_m < low_m:
+                    yield f"{uav} at {up_m:.1f} m at {begin_s:.3f} s"
+                    break
 
     # -- zones --------------------------------------------------------------------------
 
@@ -159,7 +173,7 @@ class FieldJudge:
         out_m += row.speed_m_s * (stops_s / 2.0 + self.stale_s) + self.astray_m
         waits_s = 0.0
         if self.world.mission.separation_m is not None:
-            waits_s, out_m = _GRANTED_S, out_m + _heights_m(self.world.mission)
+            waits_s, out_m = _GRANTED_S, out_m + _layers_apart_m(self.world.mission)
         takes_s = flown_s(out_m, speed_m_s, a_m_s2) / _slowest(self.flaws, uav)
         return since_s + waits_s + stops_s + takes_s
 
@@ -198,13 +212,17 @@ class FieldJudge:
                     yield f"{', '.join(here)} stand at {base.id} at {stay.begin_s:.3f} s"
 
 
-def _heights_m(mission: Mission) -> float:
-    """Between the lowest and the highest layer above any place that is visited [m]."""
-    separation_m = mission.separation_m or 0.0
-    layers_m = shared_layers_m(separation_m, len(mission.uavs), mission.band_m, 0.0)
+def _heights_m(mission: Mission) -> list[float]:
+    """Of all places that are visited, and of tasks' own [m]."""
     up_m = [place[2] for task in mission.tasks for place in (task.position_enu_m, *task.path_enu_m)]
     up_m += [place.position_enu_m[2] for place in (*mission.uavs, *mission.bases)]
-    up_m += [task.height_m for task in mission.tasks if task.height_m is not None]
+    return up_m + [task.height_m for task in mission.tasks if task.height_m is not None]
+
+
+def _layers_apart_m(mission: Mission) -> float:
+    """Between the lowest and the highest layer above any place that is visited [m]."""
+    separation_m, up_m = mission.separation_m or 0.0, _heights_m(mission)
+    layers_m = shared_layers_m(separation_m, len(mission.uavs), mission.band_m, 0.0)
     return layers_m[-1] - layers_m[0] + max(up_m) - min(up_m)
 
 

@@ -168,6 +168,18 @@ def on_a_way(*corners: tuple[float, float, float]) -> World:
     return world
 
 
+@pytest.mark.parametrize(("up_m", "is_sound"), [(-0.4, True), (-0.6, False)])
+def test_nobody_flies_below_what_is_visited(up_m: float, is_sound: bool) -> None:
+    world = on_a_way((0.0, 100.0, 0.0), (25.0, 100.0, 0.0))
+    track = Track()
+    track.lift_off((0.0, 0.0, 10.0), 0.0)
+    sinks = MotionPiece(0.0, 10.0, (0.0, 0.0, 10.0), (0.0, 0.0, 0.1 * (up_m - 10.0)))
+    track.fly([sinks], (0.0, 0.0, up_m), 0.0)
+    world.tracks["u0"] = track
+
+    assert broken(world) == ([] if is_sound else ["underground"])
+
+
 @pytest.mark.parametrize(
     ("north_m", "margin_m", "is_sound"),
     [(0.0, 0.0, False), (10.0, 0.0, True), (12.0, 0.0, True), (12.0, 5.0, False)],

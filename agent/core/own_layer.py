@@ -1,0 +1,58 @@
+"""The height layer of one UAV's own: what lies in it, and where it is above a place.
+
+In its layer a UAV is as high above the place that it visits as the brief says, wherever that is. At
+a task that asks for a height of its own it is not, nor where it was stopped on a slant to one:
+whatever leads on from there, in any layer, leaves the layer of the brief out of its reckoning.
+"""
+
+from __future__ import annotations
+
+from typing import Final
+
+from agent.core.mission_view import MissionView
+from swarm.protocol.fields import Point
+from swarm.protocol.registers import Replica
+
+_SLACK_M: Final = 2.0
+"""A vehicle that stops is so far beside where it tells that it is, and its word some time old."""
+
+
+class OwnLayer:
+    """Of the agent that knows ``replica`` and ``mission_view``."""
+
+    def __init__(self, replica: Replica, mission_view: MissionView) -> None:
+        self._replica = replica
+        self._mission_view = mission_view
+        self._heights_of: object = None
+        """Brief and tasks of which the heights are."""
+        self._heights_m = 0.0, 0.0
+
+    def above(self, place_enu_m: Point) -> Point:
+        """Above that place or below it, in the own layer [m]."""
+        east_m, north_m, up_m = place_enu_m
+        me, brief = self._mission_view.me, self._replica.brief
+        if me is None or brief is None:
+            return place_enu_m
+        up_m = me.layer_m
+        if brief.terrain is not None:
+            from swarm.allocation.legs.ground import ground_of
+
+            up_m += ground_of(brief.terrain.terrain()).one_up_m(east_m, north_m)
+        return east_m, north_m, up_m
+
+    def misses(self, place_enu_m: Point) -> bool:
+        """Whether nothing that is visited lies so high or low that its layer is there [m].
+
+        Over hills nobody can tell: what lies between two places is higher above some ground.
+        """
+        me, brief = self._mission_view.me, self._replica.brief
+        if me is None or brief is None or brief.terrain is not None:
+            return False
+        known = id(brief), self._replica.board_version
+        if self._heights_of != known:
+            up_m = [each.position_enu_m[2] for each in (*brief.uavs, *brief.bases)]
+            for task in self._replica.board.values():
+                up_m += [place[2] for place in (task.position_enu_m, *task.path_enu_m)]
+            self._heights_of, self._heights_m = known, (min(up_m), max(up_m))
+        low_m, high_m = self._heights_m
+        return not low_m - _SLACK_M <= place_enu_m[2] - me.layer_m <= high_m + _SLACK_M
