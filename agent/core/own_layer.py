@@ -50,7 +50,8 @@ class OwnLayer:
             return False
         known = id(brief), self._replica.board_version
         if self._heights_of != known:
-            up_m = [each.position_enu_m[2] for each in (*brief.uavs, *brief.bases)]
+            up_m = [uav.position_enu_m[2] for uav in brief.uavs]
+            up_m += [base.position_enu_m[2] for base in brief.bases]
             for task in self._replica.board.values():
                 up_m += [place[2] for place in (task.position_enu_m, *task.path_enu_m)]
             self._heights_of, self._heights_m = known, (min(up_m), max(up_m))

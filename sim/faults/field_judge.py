@@ -215,7 +215,8 @@ class FieldJudge:
 def _heights_m(mission: Mission) -> list[float]:
     """Of all places that are visited, and of tasks' own [m]."""
     up_m = [place[2] for task in mission.tasks for place in (task.position_enu_m, *task.path_enu_m)]
-    up_m += [place.position_enu_m[2] for place in (*mission.uavs, *mission.bases)]
+    up_m += [uav.position_enu_m[2] for uav in mission.uavs]
+    up_m += [base.position_enu_m[2] for base in mission.bases]
     return up_m + [task.height_m for task in mission.tasks if task.height_m is not None]
 
 
