@@ -382,5 +382,10 @@ class TrafficPicture:
 
     def _has_left(self, track: NearbyTrack, place_m: Place, now_s: float) -> bool:
         """Whether it is no wonder that it is not heard: it has flown on, as it said."""
+        word, age_s = track.word, max(0.0, now_s - track.said_s)
+        fastest_m_s = max(word.speed_m_s, math.hypot(*word.velocity_enu_m_s))
+        flown_m = fastest_m_s * (age_s + STEP_S)
+        if math.dist(place_m, word.position_enu_m) + flown_m <= self._heard_m:
+            return False  # nowhere that it could be by now is so far away
         expected_m = track.expected_m(now_s, self._rules)[0]
         return math.dist(place_m, expected_m.tolist()) > self._heard_m

@@ -142,3 +142,21 @@ def test_advice_is_the_same_as_if_everybody_was_looked_at_closely(
     quick = advised()
     monkeypatch.setattr(Cylinder, "distance_m", lambda _one, _other: 0.0)
     assert quick == advised()
+
+
+@given(words, places, st.floats(0.0, 20.0), st.floats(10.0, 200.0))
+def test_who_is_forgotten_has_flown_out_of_hearing(
+    word: TrafficWord, place_m: Place, age_s: float, heard_m: float
+) -> None:
+    """Whether or not that is clear without working out where it has flown."""
+    everybody, those_heard = TrafficPicture(RULES, math.inf), TrafficPicture(RULES, heard_m)
+    for picture in (everybody, those_heard):
+        picture.hear("u1", word, 0.0, 0.0)
+    near = [
+        uav
+        for uav, track in everybody.near(place_m, age_s)
+        if not track.is_silent(age_s)
+        or math.dist(place_m, track.expected_m(age_s, RULES)[0].tolist()) <= heard_m
+    ]
+
+    assert [uav for uav, _ in those_heard.near(place_m, age_s)] == near
