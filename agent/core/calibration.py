@@ -264,7 +264,7 @@ class FlightMeter(AgentPart):
     def measure(self, now_s: float) -> bool:
         """In flight it has told its charge; whether the battery is to be looked at anew."""
         me, telemetry = self._mission_view.me, self._mission_view.telemetry
-        if me is None or telemetry is None or not self._mission_view.running:
+        if me is None or telemetry is None or not self._mission_view.clock.is_set:
             return False
         frac, mission_s = telemetry.battery_frac, self._mission_view.mission_s(now_s)
         votes = self._counts and self._measure_drain(me.endurance_s, frac, now_s)
@@ -286,7 +286,7 @@ class FlightMeter(AgentPart):
     @property
     def _counts(self) -> bool:
         brief = self._replica.brief
-        return brief is not None and is_calibrated(brief) and self._mission_view.running
+        return brief is not None and is_calibrated(brief) and self._mission_view.clock.is_set
 
     @property
     def _told(self) -> FlightRates:

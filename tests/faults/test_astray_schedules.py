@@ -22,6 +22,7 @@ BROKEN_ONCE = {
     5004270: "the judge allowed no climb on the way out of a zone",
     5005804: "the judge allowed no time for a way out of a zone to be granted",
     5010244: "the judge took the height of a task for one above the layers",
+    6003017: "who waited for its way home after the mission had ended looked at its charge no more",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 
