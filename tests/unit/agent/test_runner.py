@@ -25,8 +25,8 @@ from agent.core.interface import (
     VehicleReport,
 )
 from agent.core.station_words import AnswerStation, StationAction, StationAsked, StationWish
-from agent.runner import run_agent, seat_or_stop
-from swarm.bus.port import Bus, BusEvent, Sample, TokenGone, TokenSeen
+from agent.runner import run_agent
+from swarm.bus.port import BusEvent, Sample, TokenGone, TokenSeen
 from swarm.model import Origin
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.codec import Codec
@@ -35,7 +35,6 @@ from swarm.protocol.events import Stop
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, MissionConfig, MissionPhase, Snapshot
 from swarm.protocol.timing import Timing
-from swarm.runtime.errors import BusError
 from swarm.runtime.joining import join_mission
 from swarm.runtime.process import StopRequest
 from tests.support.builders import IDLE, MISSION, brief, epoch, message, uav
@@ -399,120 +398,5 @@ def test_the_core_is_told_what_was_dropped() -> None:
             assert played.core.dropped == {"malformed": 2, "unsigned": 3}
             played.core.replica.overfull = 4
             assert played.core.dropped == {"malformed": 2, "unsigned": 3, "no room": 4}
-
-    play(scenario)
-
-
-# -- a seat on the bus ----------------------------------------------------------------
-
-
-class Opener:
-    """Fails as often as told, then opens a seat."""
-
-    def __init__(self, failures: int, fault: Exception | None = None) -> None:
-        self.tries = 0
-        self.reasons: list[str] = []
-        self._failures = failures
-        self._fault = fault or BusError("nobody there")
-
-    async def __call__(self) -> Bus:
-        self.tries += 1
-        if self.tries <= self._failures:
-            raise self._fault
-        return MemoryNetwork().join("u0")
-
-    async def seat(self, stop: StopRequest) -> Bus | None:
-        return await seat_or_stop(self, stop, self.reasons.append)
-
-
-def test_a_seat_is_tried_for_until_there_is_one(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "RETRY_S", 0.0)
-
-    async def scenario() -> None:
-        opener = Opener(failures=3)
-
-        assert await opener.seat(StopRequest()) is not None
-        assert opener.reasons == ["nobody there"] * 3
-
-    play(scenario)
-
-
-def test_tries_that_fail_at_once_are_not_repeated_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "RETRY_S", 100.0)
-
-    async def scenario() -> None:
-        opener, stop = Opener(failures=100), StopRequest()
-        seating = asyncio.create_task(opener.seat(stop))
-        await until(lambda: bool(opener.reasons), "the first failure")
-        for _ in range(100):
-            await asyncio.sleep(0)
-        assert opener.tries == 1
-
-        stop.request(0)
-        assert await seating is None
-
-    play(scenario)
-
-
-def test_a_stop_is_heard_between_tries_that_fail_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(runner, "RETRY_S", 0.0)
-
-    async def scenario() -> None:
-        opener, stop = Opener(failures=1000), StopRequest()
-        stop.request(0)
-
-        assert await opener.seat(stop) is None
-        assert opener.tries < 1000
-
-    play(scenario)
-
-
-class Hanging:
-    """Never opens; remembers that it was given up."""
-
-    def __init__(self) -> None:
-        self.trying = asyncio.Event()
-        self.given_up = False
-
-    async def __call__(self) -> Bus:
-        self.trying.set()
-        try:
-            await asyncio.Event().wait()
-        finally:
-            self.given_up = True
-        raise AssertionError
-
-
-def test_a_try_under_way_is_given_up_when_told_to_stop() -> None:
-    async def scenario() -> None:
-        opening, stop = Hanging(), StopRequest()
-        seating = asyncio.create_task(seat_or_stop(opening, stop, pytest.fail))
-        await opening.trying.wait()
-        stop.request(0)
-
-        assert await seating is None
-        assert opening.given_up
-
-    play(scenario)
-
-
-def test_a_try_under_way_does_not_outlive_who_wanted_it() -> None:
-    async def scenario() -> None:
-        opening = Hanging()
-        seating = asyncio.create_task(seat_or_stop(opening, StopRequest(), pytest.fail))
-        await opening.trying.wait()
-        seating.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await seating
-
-        assert opening.given_up
-
-    play(scenario)
-
-
-def test_what_is_no_trouble_of_the_bus_is_raised() -> None:
-    async def scenario() -> None:
-        with pytest.raises(OwnError):
-            await Opener(1, OwnError()).seat(StopRequest())
 
     play(scenario)

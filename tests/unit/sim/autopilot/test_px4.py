@@ -10,7 +10,6 @@ import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from sim.autopilot.config import Delays
-from sim.autopilot.firmware.px4 import Px4Model
 from tests.support.ground_station import (
     ACCEPTED,
     DENIED,
@@ -20,70 +19,20 @@ from tests.support.ground_station import (
     only,
     the,
 )
-from tests.support.ground_station import ground_station as any_ground_station
-
-TEMPORARILY_REJECTED = 1
-TAKEOFF, HOLD, MISSION, RETURN, LAND = (4, 2), (4, 3), (4, 4), (4, 5), (4, 6)
-POSITION = (3, 0)
-HOME_ALT_M = 488.0
-
-
-def ground_station(**config: Any) -> GroundStation:
-    return any_ground_station(Px4Model(), **{"cruise_m_s": 5.0, **config})
-
-
-def take_off(ground: GroundStation, alt_m: float = math.nan) -> int:
-    nan = math.nan
-    return ground.command(mavlink.MAV_CMD_NAV_TAKEOFF, 0, 0, 0, nan, nan, nan, alt_m)
-
-
-def airborne(height_m: float = 10.0, **config: Any) -> GroundStation:
-    """A vehicle that holds its place above home."""
-    ground = ground_station(**config)
-    ground.wait(5.0)
-    assert ground.arm() == ACCEPTED
-    assert take_off(ground, home_alt_m(ground) + height_m) == ACCEPTED
-    ground.wait(height_m / ground.vehicle.config.climb_m_s + 1.0)
-    assert mode(ground) == HOLD
-    return ground
-
-
-def home_alt_m(ground: GroundStation) -> float:
-    return ground.vehicle.config.origin.alt_m
-
-
-def mode(ground: GroundStation) -> tuple[int, int]:
-    """Main and sub mode in the next heartbeat."""
-    ground.wait(1.0)
-    custom_mode = only(ground.heard, "HEARTBEAT")[-1].custom_mode
-    return custom_mode >> 16 & 0xFF, custom_mode >> 24
-
-
-def reposition(ground: GroundStation, north_m: float, speed_m_s: float = -1.0, **to: Any) -> int:
-    lat_e7, lon_e7 = ground.place_e7(0.0, north_m)
-    return ground.command_int(
-        mavlink.MAV_CMD_DO_REPOSITION,
-        to.get("frame", mavlink.MAV_FRAME_GLOBAL_INT),
-        lat_e7,
-        lon_e7,
-        to.get("alt_m", home_alt_m(ground) + 10.0),
-        speed_m_s,
-        to.get("flags", 1.0),
-    )
-
-
-def reached(ground: GroundStation) -> list[int]:
-    return [message.seq for message in only(ground.heard, "MISSION_ITEM_REACHED")]
-
-
-def mission_texts(ground: GroundStation) -> list[str]:
-    return [text.rstrip("\t") for text in ground.texts() if "ission" in text]
-
-
-def checked(ground: GroundStation, *items: Any) -> None:
-    """Upload a mission and wait until it can be begun."""
-    assert ground.upload(*items) == 0
-    ground.wait(2.0)
+from tests.support.px4_ground import (
+    HOLD,
+    LAND,
+    POSITION,
+    RETURN,
+    TAKEOFF,
+    TEMPORARILY_REJECTED,
+    airborne,
+    ground_station,
+    home_alt_m,
+    mode,
+    reposition,
+    take_off,
+)
 
 
 def test_it_boots_into_hold_and_stands_by_when_it_is_up() -> None:
@@ -324,149 +273,6 @@ def test_motors_are_not_stopped_in_the_air_unless_forced() -> None:
     assert ground.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0) == TEMPORARILY_REJECTED
     assert ground.texts()[-1] == "Disarming denied: not landed\t"
     assert ground.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 21196) == ACCEPTED
-
-
-def test_a_mission_is_checked_before_its_mode_can_be_entered() -> None:
-    ground = airborne()
-    assert ground.upload(ground.item(0, 0.0, 50.0)) == 0
-
-    assert ground.set_mode(*MISSION) == ACCEPTED
-    assert mode(ground) == HOLD
-    assert mission_texts(ground) == ["No valid mission available, loitering"]
-    ground.wait(1.0)
-    assert ground.set_mode(*MISSION) == ACCEPTED
-    assert mode(ground) == MISSION
-
-
-def test_item_0_is_a_waypoint_and_what_was_reached_is_told_ten_times_more() -> None:
-    ground = airborne(12.0)
-    checked(ground, ground.item(0, 0.0, 60.0), ground.item(1, 60.0, 60.0))
-    ground.set_mode(*MISSION)
-    ground.wait(12.0)
-    assert ground.position_enu_m == pytest.approx((0.0, 60.0, 12.0), abs=0.1)
-    ground.wait(13.0)
-
-    assert reached(ground) == [0] * 11 + [1]
-    assert mode(ground) == HOLD
-    assert mission_texts(ground) == ["Executing Mission", "Mission finished, loitering"]
-
-
-def test_a_finished_mission_begins_again_only_when_its_current_item_was_set() -> None:
-    ground = airborne(12.0)
-    items = [ground.item(0, 0.0, 10.0, params=(0.0, 0.0, 0.0, math.nan))]
-    checked(ground, *items)
-    ground.set_mode(*MISSION)
-    ground.wait(5.0)
-    checked(ground, *items)
-    ground.set_mode(*MISSION)
-    assert mode(ground) == HOLD
-    ground.send(mavlink.MAVLink_mission_set_current_message(1, 1, 0))
-    ground.set_mode(*MISSION)
-    ground.wait(1.0)
-
-    assert mission_texts(ground) == [
-        "Executing Mission",
-        "Mission finished, loitering",
-        "No valid mission available, loitering",
-        "Executing Mission",
-        "Mission finished, loitering",
-    ]
-
-
-def test_another_mission_after_the_end_begins_without_further_ado() -> None:
-    ground = airborne(12.0)
-    checked(ground, ground.item(0, 0.0, 10.0))
-    ground.set_mode(*MISSION)
-    ground.wait(5.0)
-    checked(ground, ground.item(0, 0.0, 100.0))
-    ground.set_mode(*MISSION)
-
-    assert mode(ground) == MISSION
-
-
-def test_a_mission_replaced_while_it_is_flown_is_begun_at_once_from_its_first_item() -> None:
-    ground = airborne(12.0)
-    checked(ground, ground.item(0, 0.0, 10.0), ground.item(1, 0.0, 200.0))
-    ground.set_mode(*MISSION)
-    ground.wait(10.0)
-    assert ground.upload(ground.item(0, 50.0, 0.0)) == 0
-    ground.wait(15.0)
-
-    assert ground.position_enu_m == pytest.approx((50.0, 0.0, 12.0), abs=0.1)
-
-
-def test_a_mission_below_its_height_is_begun_with_a_climb() -> None:
-    ground = airborne(5.0)
-    checked(ground, ground.item(0, 0.0, 50.0, height_m=20.0))
-    ground.set_mode(*MISSION)
-    ground.wait(5.0)
-
-    assert ground.position_enu_m == pytest.approx((0.0, 0.0, 20.0), abs=0.1)
-    assert "Climb to 20.0 meters above home\t" in ground.texts()
-    ground.wait(10.1)
-    assert reached(ground) == [0]
-
-
-def test_a_mission_started_on_the_ground_arms_and_takes_off_by_itself() -> None:
-    ground = ground_station()
-    ground.wait(5.0)
-    checked(ground, ground.item(0, 0.0, 50.0))
-
-    assert ground.command(mavlink.MAV_CMD_MISSION_START) == ACCEPTED
-    ground.wait(12.0 / 2.5 + 10.2)
-    assert reached(ground) == [0]
-
-
-def test_a_mission_can_be_flown_again_after_landing() -> None:
-    ground = airborne(12.0)
-    checked(ground, ground.item(0, 0.0, 10.0))
-    for _ in range(2):
-        ground.set_mode(*MISSION)
-        ground.wait(10.0)
-        assert ground.set_mode(*LAND) == ACCEPTED
-        ground.wait(30.0)
-        assert not ground.vehicle.pilot.armed
-        ground.arm()
-        take_off(ground, home_alt_m(ground) + 12.0)
-        ground.wait(8.0)
-
-    assert reached(ground) == [0, 0]
-
-
-def test_an_item_that_returns_home_ends_the_mission_in_the_mode_for_it() -> None:
-    ground = airborne(12.0)
-    rtl = ground.item(1, command=mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
-    checked(ground, ground.item(0, 0.0, 50.0), rtl)
-    ground.set_mode(*MISSION)
-    ground.wait(12.0)
-
-    assert mode(ground) == RETURN
-    assert [seq for seq in reached(ground) if seq > 0] == [1]
-    ground.wait(60.0)
-    assert not ground.vehicle.pilot.armed
-
-
-def test_an_item_that_lands_ends_the_mission_and_the_flight() -> None:
-    ground = airborne(12.0)
-    checked(ground, ground.item(0, 0.0, 50.0, command=mavlink.MAV_CMD_NAV_LAND))
-    ground.set_mode(*MISSION)
-    ground.wait(30.0)
-
-    assert ground.position_enu_m == pytest.approx((0.0, 50.0, 0.0), abs=0.1)
-    assert ground.texts()[-2:] == ["Mission finished, landed\t", "Disarmed by landing\t"]
-    assert mode(ground) == HOLD
-
-
-@pytest.mark.parametrize("stay_s", [0.0, 7.0])
-def test_a_waypoint_is_reached_when_its_hold_time_is_over(stay_s: float) -> None:
-    ground = airborne(12.0)
-    checked(ground, ground.item(0, 0.0, 50.0, params=(stay_s, 0.0, 0.0, 0.0)))
-    ground.set_mode(*MISSION)
-    ground.wait(10.0 + stay_s - 0.1)
-    assert reached(ground) == []
-    ground.wait(0.2)
-
-    assert reached(ground) == [0]
 
 
 def test_items_are_given_back_with_frames_of_whole_numbers() -> None:
