@@ -25,7 +25,7 @@ from tests.sitl.whole_run import autopilot_of, by_day
 pytestmark = [pytest.mark.sitl, pytest.mark.process]
 
 VINEYARD = resolve_scenario("vineyard")
-SPEEDUP = 6.0
+SPEEDUP = 4.5
 """More, and a UAV is told of by so few places that it cannot be judged by them."""
 FLIGHTS = by_day(FirmwareKind.ARDUPILOT, CommandStyle.REPOSITION)
 
