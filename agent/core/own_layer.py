@@ -48,7 +48,7 @@ class OwnLayer:
         me, brief = self._mission_view.me, self._replica.brief
         if me is None or brief is None or brief.terrain is not None:
             return False
-        known = id(brief), self._replica.board_version
+        known = brief, self._replica.board_version
         if self._heights_of != known:
             up_m = [uav.position_enu_m[2] for uav in brief.uavs]
             up_m += [base.position_enu_m[2] for base in brief.bases]

@@ -10,7 +10,7 @@ from agent.core.interface import Arrived, Held, VehicleReady
 from agent.core.mission_view import MissionView
 from agent.core.own_layer import OwnLayer
 from swarm.model.ids import OPERATOR
-from swarm.protocol.messages import CommandKind, OperatorCommand
+from swarm.protocol.messages import CommandKind, OperatorCommand, TaskEntry
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from tests.support.builders import entry
 from tests.support.field_agent import FieldAgent, Script
@@ -62,19 +62,26 @@ def heights_m(agent: FieldAgent) -> set[float]:
     return {round(up_m, 6) for _, _, up_m in claim.way.path_enu_m[1:]}
 
 
+def assert_flies_on_in_layers(
+    agent: FieldAgent, script: Script, task: TaskEntry, mission_s: float
+) -> None:
+    """A task appears then, and it asks for a way there."""
+    script.items = [task.task]
+    agent.post(task)
+    agent.tick(mission_s)
+
+    assert agent.task == task.task
+    assert heights_m(agent)
+    assert heights_m(agent) <= {*LAYERS_M}
+
+
 def test_who_hovers_at_a_height_of_its_task_flies_on_in_layers(script: Script) -> None:
     agent = apart(script, height_m=HIGH_M)
     agent.be_at((20.0, 0.0, HIGH_M), None)
     agent.arrive(30.0)
     hold_and_resume(agent, (20.0, 0.0, HIGH_M))
 
-    script.items = ["t1"]
-    agent.post(entry("t1", 80.0, number=1))
-    agent.tick(40.0)
-
-    assert agent.task == "t1"
-    assert heights_m(agent)
-    assert heights_m(agent) <= {*LAYERS_M}
+    assert_flies_on_in_layers(agent, script, entry("t1", 80.0, number=1), 40.0)
 
 
 def test_who_was_stopped_on_a_slant_from_one_flies_on_in_layers(script: Script) -> None:
@@ -87,13 +94,7 @@ def test_who_was_stopped_on_a_slant_from_one_flies_on_in_layers(script: Script) 
     assert heights_m(agent) == {17.0}, "straight"
     hold_and_resume(agent, (20.0, 20.0, 31.0))
 
-    script.items = ["t2"]
-    agent.post(entry("t2", 80.0, number=2))
-    agent.tick(60.0)
-
-    assert agent.task == "t2"
-    assert heights_m(agent)
-    assert heights_m(agent) <= {*LAYERS_M}
+    assert_flies_on_in_layers(agent, script, entry("t2", 80.0, number=2), 60.0)
 
 
 @pytest.mark.parametrize(("up_m", "misses"), [(17.0, False), (24.5, True), (14.9, True)])
