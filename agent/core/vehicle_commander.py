@@ -79,6 +79,8 @@ class VehicleCommander(AgentPart):
         """Whether it has been in the air in this life."""
         self._reason = ""
         """Why it flies home."""
+        self._unready = ""
+        """Why the vehicle was not ready, as its status told last."""
 
     # -- what it reports ------------------------------------------------------------
 
@@ -93,6 +95,7 @@ class VehicleCommander(AgentPart):
             case NotReady(reason):
                 if self._machine.state not in PAUSED_BY_OPERATOR:  # why it holds is worth more
                     self._announcer.explain(reason)
+                    self._unready = self._announcer.note
                 self._log("vehicle not ready", reason=reason)
             case Caution(reason):
                 self._announcer.caution(reason)
@@ -100,6 +103,8 @@ class VehicleCommander(AgentPart):
             case FlightLimits():
                 self._tasking.introduce(report)
             case Arrived(leg):
+                if self._announcer.note == self._unready:  # from a base it was ready on its way
+                    self._announcer.explain("")
                 self._tasking.arrive(leg, now_s)
             case Landed(leg):
                 self._tasking.touch_down(leg, now_s)
@@ -266,14 +271,18 @@ class VehicleCommander(AgentPart):
     def _turn_home(
         self, trigger: Trigger, reason: str, via_enu_m: Point | None, now_s: float
     ) -> None:
-        """Order the return, from whatever the vehicle does now."""
+        """Order the return, from whatever the vehicle does now.
+
+        On its way home it is told so again at every step, and works no way out for that.
+        """
+        if not self._machine.allows(trigger):
+            return
         before, order, home = (
             self._machine.state,
             self._return(reason, via_enu_m),
             self._tasking.way_home(),
         )
-        if not self._machine.take(trigger):
-            return
+        self._machine.take(trigger)
         if before not in HEADED_HOME:
             self._take_no_further_part(now_s)
         self._announcer.explain(reason)

@@ -6,14 +6,14 @@ import asyncio
 import socket
 from collections import defaultdict
 from collections.abc import AsyncIterator
-from contextlib import AsyncExitStack, asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager, suppress
 from dataclasses import replace
 from typing import Any
 
 import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
-from agent.core.interface import VehicleReady, VehicleReport
+from agent.core.interface import Refused, VehicleReady, VehicleReport
 from agent.links.mavlink_vehicle import MavlinkVehicle
 from agent.links.station_links import StationLinks
 from agent.vehicle.config import ONBOARD_COMPUTER, BridgeConfig, UdpOutAddress
@@ -30,13 +30,16 @@ from tests.support.bridge_flight import ORIGIN, START
 
 pytestmark = pytest.mark.sitl
 
-SPEEDUP = 20.0
+SPEEDUP = 5.0
 CONFIG = BridgeConfig(1, ORIGIN, position_rate_hz=20.0).for_speedup(SPEEDUP)
 KEY = SigningKey(bytes(range(32)))
 
 
-class GroundStation(asyncio.DatagramProtocol):
-    """Listens at one UDP port for everybody."""
+class GroundStation:
+    """Listens at one UDP port for everybody.
+
+    Reads all that has come whenever it is its turn: what waits beyond a socket's buffer is lost.
+    """
 
     def __init__(self) -> None:
         self.datagrams: list[bytes] = []
@@ -44,26 +47,31 @@ class GroundStation(asyncio.DatagramProtocol):
         self.beside: list[bytes] = []
         """Of their agents."""
         self.senders: set[tuple[str, int]] = set()
-        self._transport: asyncio.DatagramTransport | None = None
+        self._socket: socket.socket | None = None
 
-    async def listen(self, family: socket.AddressFamily = socket.AF_INET) -> int:
-        host = "::1" if family == socket.AF_INET6 else "127.0.0.1"
-        loop = asyncio.get_running_loop()
-        self._transport, _ = await loop.create_datagram_endpoint(lambda: self, local_addr=(host, 0))
-        port: int = self._transport.get_extra_info("sockname")[1]
+    def listen(self, family: socket.AddressFamily = socket.AF_INET) -> int:
+        self._socket = socket.socket(family, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        self._socket.bind(("::1" if family == socket.AF_INET6 else "127.0.0.1", 0))
+        asyncio.get_running_loop().add_reader(self._socket, self._read)
+        port: int = self._socket.getsockname()[1]
         return port
 
-    def datagram_received(self, data: bytes, addr: tuple[str, int]) -> None:
-        self.senders.add(addr)
-        if data[0] == 0xFD and data[6] == ONBOARD_COMPUTER:  # what agents say themselves
-            self.beside.append(data)
-        else:
-            self.datagrams.append(data)
+    def _read(self) -> None:
+        assert self._socket is not None
+        with suppress(BlockingIOError):
+            while True:
+                data, sender = self._socket.recvfrom(2048)
+                self.senders.add(sender)
+                if data[0] == 0xFD and data[6] == ONBOARD_COMPUTER:  # what agents say themselves
+                    self.beside.append(data)
+                else:
+                    self.datagrams.append(data)
 
     def say(self, data: bytes) -> None:
-        assert self._transport is not None
+        assert self._socket is not None
         for sender in self.senders:
-            self._transport.sendto(data, sender)
+            self._socket.sendto(data, sender)
 
     def messages(self) -> dict[int, set[str]]:
         """Names of the messages heard, by system id; every datagram is one frame."""
@@ -75,8 +83,10 @@ class GroundStation(asyncio.DatagramProtocol):
         return names
 
     def close(self) -> None:
-        assert self._transport is not None
-        self._transport.close()
+        assert self._socket is not None
+        self._read()
+        asyncio.get_running_loop().remove_reader(self._socket)
+        self._socket.close()
 
 
 @asynccontextmanager
@@ -103,19 +113,26 @@ async def flown(
         await server.close()
 
 
+def is_ready(reports: list[VehicleReport]) -> bool:
+    """Whether a vehicle has reported that it is; it must not have refused to be."""
+    refused = [report for report in reports if isinstance(report, Refused)]
+    assert not refused
+    return VehicleReady() in reports
+
+
 @pytest.mark.parametrize("key", [None, KEY])
 def test_two_vehicles_are_shown_to_one_ground_station_which_commands_neither(
     key: SigningKey | None,
 ) -> None:
     async def scenario() -> None:
         station, clock = GroundStation(), ScaledClock(SPEEDUP)
-        forward = [f"udp:127.0.0.1:{await station.listen()}"]
+        forward = [f"udp:127.0.0.1:{station.listen()}"]
         async with AsyncExitStack() as stack:
             one, one_reports = await stack.enter_async_context(flown(3, forward, clock, key))
             two, two_reports = await stack.enter_async_context(flown(7, forward, clock, key))
             orders = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
             land = mavlink.MAVLink_command_long_message(3, 1, 176, 0, 1, 9, 0, 0, 0, 0, 0)
-            while VehicleReady() not in one_reports or VehicleReady() not in two_reports:
+            while not (is_ready(one_reports) and is_ready(two_reports)):
                 station.say(bytes(land.pack(orders)))
                 await asyncio.sleep(0.02)
             assert not one.dropped
@@ -136,8 +153,8 @@ def test_frames_are_shown_as_they_came_and_only_the_vehicles() -> None:
     async def scenario() -> None:
         station, other, server = GroundStation(), GroundStation(), Server()
         forward = [
-            f"udp:127.0.0.1:{await station.listen()}",
-            f"udp:[::1]:{await other.listen(socket.AF_INET6)}",
+            f"udp:127.0.0.1:{station.listen()}",
+            f"udp:[::1]:{other.listen(socket.AF_INET6)}",
         ]
         url = f"tcp:127.0.0.1:{await server.listen()}"
         vehicle = MavlinkVehicle(CONFIG, url, ScaledClock(1.0), _nobody, forward=forward)

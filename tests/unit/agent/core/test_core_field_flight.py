@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from agent.core.flights import Flights
-from agent.core.interface import Arrived, GoTo, Refused, Return
+from agent.core.interface import Arrived, GoTo, NotReady, Refused, Return
 from agent.core.states import AgentState
 from swarm.model.ids import FLEET, OPERATOR
 from swarm.protocol.messages import CommandKind, MissionPhase, OperatorCommand
@@ -23,7 +23,7 @@ from tests.support.field_agent import (
     Script,
     square,
 )
-from tests.support.lone_agent import ABOVE_START, claims, notes, orders
+from tests.support.lone_agent import ABOVE_START, claims, notes, orders, statuses
 
 WALL = square("wall", 50.0, 0.0)
 LINE = ((100.0, 0.0, 0.0), (100.0, 20.0, 0.0), (100.0, 50.0, 0.0))
@@ -38,6 +38,20 @@ def flying(script: Script, item: str = "t0", **task: object) -> FieldAgent:
     agent.start_mission()
     assert agent.state() is AgentState.FLYING
     return agent
+
+
+def test_why_it_was_not_ready_is_told_no_more_once_it_is_there(script: Script) -> None:
+    """From a base the vehicle gets ready on its way, and says so by arriving."""
+    agent = flying(script)
+    agent.happen(NotReady("climbing to 16 m"))
+    agent.run_until(99.0)
+    assert statuses(agent.log)[-1].note == "climbing to 16 m"
+
+    agent.arrive(100.0)
+    agent.run_until(101.0)
+
+    assert agent.state() is AgentState.SERVING
+    assert statuses(agent.log)[-1].note == ""
 
 
 def test_it_flies_round_a_zone_as_it_reckons(script: Script) -> None:
@@ -298,6 +312,27 @@ def test_with_nothing_to_do_it_goes_to_its_start_for_good_if_that_is_nearest(
     assert agent.way_home.via_enu_m == ABOVE_START
     assert agent.way_home.land
     assert agent.phase is ClaimPhase.OUT
+
+
+def test_on_its_way_home_it_works_out_its_way_no_more(
+    script: Script, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its battery stays about to be used up, and it tells where it is many times a second."""
+    agent = FieldAgent(bases=[FAR_BASE])
+    agent.fly_to(entry("t0", 40.0))
+    script.items = ["t0"]
+    agent.start_mission()
+    agent.run_until(39.0)
+    agent.arrive(40.0)
+    agent.run_until(BUDGET_S - 40.0)
+    assert agent.state() is AgentState.RETURNING_VIA_START
+    asked: list[object] = []
+    monkeypatch.setattr(Flights, "way_home", asked.append)
+
+    for step in range(20):
+        agent.be_at((40.0 - step, 0.0, 10.0), 0.3, BUDGET_S - 40.0 + step)
+
+    assert asked == []
 
 
 def test_with_nothing_open_it_asks_for_no_ways_to_other_bases_while_it_hovers(
