@@ -239,10 +239,12 @@ class FlightLog:
         task = self._tasks.get(order.task or "")
         leg.leg = order.leg
         if leg.arrive_s is not None and task is not None and task.path_enu_m:
-            if way == leg.via_m[-1:]:
+            if leg.begin_s is None and way == leg.via_m[-1:]:
                 return  # another life of its agent sends it where it is already, and waits on
-            leg.begin_s = now_s if leg.begin_s is None else leg.begin_s
-            leg.is_reversed = way[-1] == task.path_enu_m[0][:2]
+            backwards = way[-1] == task.path_enu_m[0][:2]
+            if leg.begin_s is None or leg.is_reversed != backwards:
+                # What led along before was the way to its other end, or is flown all over again.
+                leg.begin_s, leg.is_reversed = now_s, backwards
             return
         leg.via_m = [*self._passed_m(uav, leg.depart_s, now_s), here, *way]
         leg.arrive_s = None

@@ -41,6 +41,23 @@ def test_a_line_begins_when_it_is_flown_not_when_its_first_end_is_ordered_again(
     assert not entry.is_reversed
 
 
+def test_who_waits_at_one_end_and_takes_the_line_from_the_other_begins_it_there() -> None:
+    log = FlightLog(MISSION, {})
+
+    log.ordered("u0", GoTo(1, LINE[0], task="line"), at((0.0, 0.0, 0.0)), 0.0)
+    log.reported("u0", Arrived(1), 10.0)
+    # It lets go of the task before that opens, and takes it anew, from its other end.
+    log.ordered("u0", GoTo(2, LINE[2], task="line"), at(LINE[0]), 12.0)
+    log.reported("u0", Arrived(2), 28.0)
+    log.ordered("u0", GoTo(3, LINE[0], task="line", via_enu_m=(LINE[1],)), at(LINE[2]), 30.0)
+    log.reported("u0", Arrived(3), 50.0)
+    log.attempt_ended("u0", Outcome("line", AttemptResult.DONE, 1, 50.0), 50.0, 0.0)
+
+    (entry,) = log.executed_schedule(0.0)[UavId("u0")]
+    assert (entry.begin_s, entry.end_s) == (30.0, 50.0)
+    assert entry.is_reversed
+
+
 def test_an_attempt_of_which_is_told_late_ended_when_it_did() -> None:
     """Its agent hung in between; a clock that is a little slow is no reason."""
     for completed_s, end_s in ((45.0, 52.0), (52.6, 60.0), (53.0, 60.0)):
