@@ -11,7 +11,8 @@ from agent.core.flights import Flights
 from agent.core.interface import Arrived, GoTo, NotReady, Refused, Return
 from agent.core.states import AgentState
 from swarm.model.ids import FLEET, OPERATOR
-from swarm.protocol.messages import CommandKind, MissionPhase, OperatorCommand
+from swarm.protocol.field_messages import BaseSpec
+from swarm.protocol.messages import CommandKind, MissionPhase, OperatorCommand, TaskEntry
 from swarm.protocol.uav_messages import AttemptResult, BaseStage, ClaimPhase
 from tests.support.builders import entry, epoch
 from tests.support.field_agent import (
@@ -37,6 +38,16 @@ def flying(script: Script, item: str = "t0", **task: object) -> FieldAgent:
     script.items = [item]
     agent.start_mission()
     assert agent.state() is AgentState.FLYING
+    return agent
+
+
+def about_to_arrive(script: Script, base: BaseSpec, *others: TaskEntry) -> FieldAgent:
+    """In a second it is at `t0`, 40 m away, which is all that it finds to do."""
+    agent = FieldAgent(bases=[base])
+    agent.fly_to(entry("t0", 40.0), *others)
+    script.items = ["t0"]
+    agent.start_mission()
+    agent.run_until(39.0)
     return agent
 
 
@@ -276,11 +287,7 @@ def test_a_task_that_the_battery_does_not_last_for_is_given_up(script: Script) -
 
 
 def test_with_nothing_to_do_it_goes_to_the_nearest_base_in_time(script: Script) -> None:
-    agent = FieldAgent()
-    agent.fly_to(entry("t0", 40.0))
-    script.items = ["t0"]
-    agent.start_mission()
-    agent.run_until(39.0)
+    agent = about_to_arrive(script, BASE)
     agent.arrive(40.0)
     assert agent.state() is AgentState.IDLE
 
@@ -299,11 +306,7 @@ def test_with_nothing_to_do_it_goes_to_the_nearest_base_in_time(script: Script) 
 def test_with_nothing_to_do_it_goes_to_its_start_for_good_if_that_is_nearest(
     script: Script,
 ) -> None:
-    agent = FieldAgent(bases=[FAR_BASE])
-    agent.fly_to(entry("t0", 40.0))
-    script.items = ["t0"]
-    agent.start_mission()
-    agent.run_until(39.0)
+    agent = about_to_arrive(script, FAR_BASE)
     agent.arrive(40.0)
 
     agent.run_until(BUDGET_S - 40.0)
@@ -318,11 +321,7 @@ def test_on_its_way_home_it_works_out_its_way_no_more(
     script: Script, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its battery stays about to be used up, and it tells where it is many times a second."""
-    agent = FieldAgent(bases=[FAR_BASE])
-    agent.fly_to(entry("t0", 40.0))
-    script.items = ["t0"]
-    agent.start_mission()
-    agent.run_until(39.0)
+    agent = about_to_arrive(script, FAR_BASE)
     agent.arrive(40.0)
     agent.run_until(BUDGET_S - 40.0)
     assert agent.state() is AgentState.RETURNING_VIA_START
@@ -338,11 +337,7 @@ def test_on_its_way_home_it_works_out_its_way_no_more(
 def test_with_nothing_open_it_asks_for_no_ways_to_other_bases_while_it_hovers(
     script: Script, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    agent = FieldAgent(bases=[FAR_BASE])
-    agent.fly_to(entry("t0", 40.0))
-    script.items = ["t0"]
-    agent.start_mission()
-    agent.run_until(39.0)
+    agent = about_to_arrive(script, FAR_BASE)
     asked: list[str] = []
     monkeypatch.setattr(Flights, "way_to_base", lambda _flights, base: asked.append(base))
 
@@ -358,11 +353,7 @@ def test_with_nothing_to_do_but_a_task_open_it_goes_for_another_battery(
     script: Script, east_m: float, goes_on: bool
 ) -> None:
     """Somebody else is to do it, who may be lost; but not where no battery lasts for it."""
-    agent = FieldAgent(bases=[FAR_BASE])
-    agent.fly_to(entry("t0", 40.0), entry("t1", east_m, number=1))
-    script.items = ["t0"]
-    agent.start_mission()
-    agent.run_until(39.0)
+    agent = about_to_arrive(script, FAR_BASE, entry("t1", east_m, number=1))
     agent.arrive(40.0)
     way_s = math.hypot(40.0, 300.0)
 
