@@ -31,6 +31,7 @@ from agent.core.interface import (
     Refused,
     Return,
     ReturnAdvised,
+    Swap,
     Telemetry,
     VehicleOrder,
     VehicleReady,
@@ -75,11 +76,10 @@ class Airway:
         """By when the UAV must have landed, its reserve kept [s mission time]."""
         self._fleet = FleetAir(uav, replica, mission_view, peers)
         self._way: ClaimedWay | None = None
-        self._aloft = self._moves = False
-        """Whether the vehicle may be anywhere on its way."""
-        self._stops = False
-        """Whether it has been told to stop, for the wish to be asked from there, and where."""
+        self._aloft = self._moves = self._stops = False
+        """Whether the vehicle may be anywhere on its way, and has been told to stop on it."""
         self._stop_enu_m: Point | None = None
+        """Where, for the wish to be asked from there."""
         self._own_height = False
         """Whether its way ends at the height of a task."""
         self._at_own_height = False
@@ -103,7 +103,7 @@ class Airway:
         """Whether somebody may still have to be let by."""
         self._room_at_s = -math.inf
         """Not before does it look again whether it is in anybody's way."""
-        self._vehicle = PlaceOnWay()
+        self._vehicle = PlaceOnWay(timing.patience_s)
         self._rises = False
         """Whether it asks for air to take off into, or has got it, and is not up there yet."""
         self._unplaced: Callable[[], None] | None = None
@@ -113,6 +113,11 @@ class Airway:
     def waits(self) -> bool:
         """Whether an order waits for its way."""
         return self._wish is not None
+
+    @property
+    def waits_on_ground(self) -> bool:
+        """Whether that order is to take the vehicle up from the base where it stands."""
+        return self._wish is not None and self._stands_at is not None
 
     # -- what the vehicle says -----------------------------------------------------------------
 
@@ -124,6 +129,7 @@ class Airway:
         match event:
             case Telemetry(position_enu_m=place):
                 self._vehicle.tell(place)
+                self._mission_view.waits_on_ground = self.waits_on_ground
                 nominal_enu_m = self._nominal(place)
                 self._mission_view.raised_m = place[2] - nominal_enu_m[2]
                 return replace(event, position_enu_m=nominal_enu_m)
@@ -182,7 +188,7 @@ class Airway:
         passes = isinstance(order, Prepare) and not self._rises
         if self._shared is None or not claimed or passes or not isinstance(order, _BY_GRANT):
             self._actions.append(OrderVehicle(order))
-            if isinstance(order, Hold | Prepare) and self._shared is not None:
+            if isinstance(order, Hold | Prepare | Swap) and self._shared is not None:
                 self._stops = False
                 self._drop_wish()
             return
@@ -194,7 +200,7 @@ class Airway:
             if way.flies and order.via_enu_m is not None:  # on its way up it has no other air
                 order = replace(order, path_enu_m=(), via_enu_m=way.path_enu_m[-1])
             here = None
-        elif here is None and self._aloft and self._awaits_place():
+        elif here is None and self._aloft and self._vehicle.is_awaited(self._mission_view.now_s):
             again = partial(self.order, own_height=own_height, fixed=fixed, takes_s=takes_s)
             self._unplaced = partial(again, order)
             return
@@ -225,9 +231,6 @@ class Airway:
                 self._way = left
                 self._depart(self._wish)
                 self._wish = None
-
-    def _awaits_place(self) -> bool:
-        return self._vehicle.is_awaited(self._mission_view.now_s, self._retry_s)
 
     def _drop_wish(self) -> None:
         """Nothing is asked for any more."""
@@ -289,7 +292,7 @@ class Airway:
         air, claim = self._shared, self._replica.claims.get(self._uav)
         if air is None or claim is None or not self._has_changed(now_s):
             return []
-        if self._unplaced is not None and not self._awaits_place():
+        if self._unplaced is not None and not self._vehicle.is_awaited(now_s):
             self._unplaced()
         self._fleet.note_losses()
         given_up = self._press(air, now_s)
@@ -330,7 +333,7 @@ class Airway:
         """When `settle` will next have something to do."""
         wish = self._aside or self._wish
         if self._unplaced is not None:
-            return self._vehicle.awaited_since_s + self._retry_s
+            return self._vehicle.awaited_until_s
         if self._stops:
             return None
         again_s = self._room_at_s if self._looks_again else None
@@ -393,7 +396,8 @@ class Airway:
         """Ask for the nearest layer in which nobody is in the way, else for one to wait for."""
         here, aside = hovering(self._told_way), wish is self._aside
         end_s = self.sortie_end_s() if self._aloft else None
-        found = self._fleet.way(air, wish, here, self._claims(), self._number(), end_s, aside=aside)
+        number = max(self._told_way.number + 1, round(1e3 * self._fleet.mission_s))
+        found = self._fleet.way(air, wish, here, self._claims(), number, end_s, aside=aside)
         if found is not None and (found.is_free or ((again or not wish.asked) and not aside)):
             self._request(wish, found.way, again=again)
         elif aside:
@@ -401,8 +405,8 @@ class Airway:
 
     def _request(self, wish: Wish, asked: ClaimedWay, *, again: bool) -> None:
         """Ask for that, unless it is asked for already, and nobody is to be let in before."""
-        current = self._told_way
-        same = (current.path_enu_m, current.shift_m) == (asked.path_enu_m, asked.shift_m)
+        now = self._told_way
+        same = (now.path_enu_m, now.shift_m) == (asked.path_enu_m, asked.shift_m)
         if again or not (wish.asked and same):
             if wish is self._aside and self._wish is not None:
                 self._wish.asked = False
@@ -461,7 +465,8 @@ class Airway:
             return
         self._left_base |= self._stands_at is not None
         self._moves, self._aloft = len(path) > 1, True
-        self._stands_at, self._lifts_enu_m, self._own_height = None, None, wish.own_height
+        self._stands_at = self._lifts_enu_m = None
+        self._own_height = wish.own_height
         self._way = replace(way, flies=True, grounded=False)
         if wish.is_shorter_than(path):
             self.when_detoured()
@@ -486,15 +491,10 @@ class Airway:
         first = self._fleet.hovers_first_enu_m
         return ClaimedWay(0, first, flies=bool(first), grounded=not self._aloft)
 
-    def _number(self) -> int:
-        mission_s = self._mission_view.mission_s(self._mission_view.now_s)
-        return max(self._told_way.number + 1, round(1e3 * mission_s))
-
     def _nominal(self, place: Point) -> Point:
         return nominal(place, self._told_way, own_height=self._own_height)
 
     def _claims(self) -> Mapping[str, Claim]:
         """Of everyone, the own one as it is about to be said."""
         claims = self._replica.claims
-        own = claims[self._uav]
-        return {**claims, self._uav: self.told(own)}
+        return {**claims, self._uav: self.told(claims[self._uav])}

@@ -81,6 +81,8 @@ class BaseVisits(AgentPart):
         self._visit = BaseVisit()
         self._left_from = BaseStage.LANDED
         """Whether it left its last base from one of its slots, or from beside them."""
+        self._departed_from: BaseSpec | None = None
+        """The base that it has just been sent off from, until it has arrived anywhere."""
         self._on_ground: bool | None = None
         """Whether the vehicle stands at the base; None: as an earlier life has claimed."""
         self._vouched: dict[str, tuple[Stamp, Claim | None]] = {}
@@ -152,11 +154,24 @@ class BaseVisits(AgentPart):
 
     # -- on its way ----------------------------------------------------------------------
 
-    def leave_ground(self) -> str | None:
-        """The vehicle takes off now; gives the base that it stood at, None if it is in the air."""
+    def leave_ground(self) -> bool:
+        """The vehicle takes off now, if it stands at a base; whether it does."""
         base, self._on_ground = self.stands_at, False
+        self._departed_from = None if base is None else self._flights.base(base)
         self._left_from = BaseStage.PARKED if self.is_parked else BaseStage.LANDED
         self._mission_view.leave_ground()
+        return base is not None
+
+    def flown(self) -> BaseSpec | None:
+        """It has arrived, or will not fly: gives the base that it was just sent off from."""
+        base, self._departed_from = self._departed_from, None
+        return base
+
+    def stand_still(self) -> BaseSpec | None:
+        """What it was sent off for is over: gives the base where it still waits for its way up."""
+        base = self.flown() if self._airway.waits_on_ground else None
+        if base is not None:
+            self._stand(base)
         return base
 
     def set_off(
@@ -272,9 +287,15 @@ class BaseVisits(AgentPart):
             self._land_or_wait(base, now_s)
 
     def break_off(self, reason: str, now_s: float) -> None:
-        """Give the base up, in the air."""
+        """Give the base up, in the air or before its way up is granted."""
         claim = self.claim
-        if claim is None or not self._machine.take(Trigger.CLAIM_LOST):
+        if claim is None:
+            return
+        if (here := self.stand_still()) is not None:
+            self._log("released", base=claim.base, reason=reason)
+            self.stay(here, now_s)
+            return
+        if not self._machine.take(Trigger.CLAIM_LOST):
             return
         self._visit, self._on_ground = BaseVisit(), False
         self._mission_view.leave_ground()
@@ -424,14 +445,18 @@ class BaseVisits(AgentPart):
         return True
 
     def stay(self, base: BaseSpec, now_s: float) -> None:
-        """The vehicle has refused to take off from ``base``: it stands there still, as before."""
+        """The vehicle has not taken off from ``base``: it stands there still, as before."""
         if self._machine.take(Trigger.STANDS_AT_BASE):
+            self._become_free(self._mission_view.mission_s(now_s), False)
             self._stay(base, self._left_from, now_s)
 
-    def _stay(self, base: BaseSpec, stage: BaseStage, now_s: float) -> None:
+    def _stand(self, base: BaseSpec) -> None:
         self._visit, self._on_ground = BaseVisit(), True
         self._sortie.land()
         self._mission_view.stand(base.position_enu_m)
+
+    def _stay(self, base: BaseSpec, stage: BaseStage, now_s: float) -> None:
+        self._stand(base)
         self._announcer.explain(f"stands at base {base.id}")
         self._swap(base)
         mission_s = self._mission_view.mission_s(now_s)

@@ -21,7 +21,8 @@ change with each leg. A later life begins with what the register says.
 
 Only the own battery is watched with more caution: where the votes without those for what is known
 say worse than what is told, its sortie ends by them (`FlightMeter.cautious_drain_frac`), so that a
-UAV that finds itself slow on its first two legs turns home in time.
+UAV that finds itself slow on its first two legs turns home in time. So it does by a span of the
+drain that is too short to have a vote, if that is fast even where words came late.
 
 Leaves out: what follows (swarm.protocol.calibration, and agent.core.field_tasking for the battery).
 """
@@ -128,6 +129,8 @@ class FlightMeter(AgentPart):
         self._lands_since_s: float | None = None
         """When it was told to land, in the air."""
         self._gauge = DrainGauge()
+        self._least_drain_frac = 0.0
+        """What the span of the drain that is under way will come to at least."""
 
     @property
     def cautious_drain_frac(self) -> float:
@@ -141,7 +144,8 @@ class FlightMeter(AgentPart):
         times, drains = self._known.times, self._known.drains
         slow = times.measured if times.count > 1 else None  # one leg may be odd
         longer = _worse(told.time_frac, slow, TIME_FRAC_RANGE) / told.time_frac
-        return longer * _worse(told.drain_frac, drains.measured, DRAIN_FRAC_RANGE)
+        drain_frac = max(drains.measured or 0.0, self._least_drain_frac)
+        return longer * _worse(told.drain_frac, drain_frac, DRAIN_FRAC_RANGE)
 
     @property
     def rates(self) -> FlightRates:
@@ -186,6 +190,7 @@ class FlightMeter(AgentPart):
         """It is on the ground, or about to land."""
         self._departure, self._at_rest = None, False
         self._gauge.begin()
+        self._least_drain_frac = 0.0
         self._stands, self._lands_since_s = False, None
 
     def come_down(self, now_s: float) -> None:
@@ -275,11 +280,16 @@ class FlightMeter(AgentPart):
     ) -> bool:
         if endurance_s is None or battery_frac is None:
             return False
+        before_frac, medians = self.cautious_drain_frac, self._medians
         used_1_s = self._gauge.read(battery_frac, now_s)
-        if used_1_s is None:
+        least_frac = (self._gauge.least_1_s or 0.0) * endurance_s
+        self._least_drain_frac = least_frac if least_frac <= DRAIN_FRAC_RANGE[1] else 0.0
+        if used_1_s is not None:
+            return self._vote(medians.drains, used_1_s * endurance_s, DRAIN_FRAC_RANGE, now_s)
+        if self.cautious_drain_frac <= before_frac * (1.0 + STEP_FRAC):
             return False
-        drain_frac = used_1_s * endurance_s
-        return self._vote(self._medians.drains, drain_frac, DRAIN_FRAC_RANGE, now_s)
+        self.sortie.heed(self.cautious_drain_frac, self._mission_view.mission_s(now_s))
+        return True
 
     # -- what comes of it --------------------------------------------------------------
 

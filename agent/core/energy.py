@@ -23,6 +23,8 @@ finely it is told."""
 _SPAN_FRAC: Final = 0.04
 _SPAN_S: Final = 20.0
 """A drain is measured over no less of the charge, and no less time: words come some time late."""
+_LATE_S: Final = 2.0
+"""So much later than others a word of the charge may come [s]."""
 _RISE_FRAC: Final = 0.005
 """Charge that goes up by more is another battery, or one that has recovered: a new span."""
 
@@ -110,10 +112,12 @@ class DrainGauge:
         """What was told last; None before the first word of a flight."""
         self._since: tuple[float, float] | None = None
         """When the span began, and with what charge; None before the charge has fallen."""
+        self.least_1_s: float | None = None
+        """What is used per second at least, by a span under way that is yet too short [1/s]."""
 
     def begin(self) -> None:
         """A flight begins, or ends: what was told before is of no use."""
-        self._told_frac, self._since = None, None
+        self._told_frac = self._since = self.least_1_s = None
 
     def read(self, battery_frac: float, now_s: float) -> float | None:
         """Take what is told now [1, s]; gives the charge used per second, once that is known [1/s].
@@ -123,7 +127,7 @@ class DrainGauge:
         """
         before_frac, self._told_frac = self._told_frac, battery_frac
         if before_frac is None or battery_frac > before_frac + _RISE_FRAC:
-            self._since = None
+            self._since = self.least_1_s = None
             return None
         if battery_frac >= before_frac:
             return None
@@ -131,9 +135,12 @@ class DrainGauge:
             self._since = now_s, battery_frac
             return None
         used_frac, flown_s = self._since[1] - battery_frac, now_s - self._since[0]
-        if used_frac < _SPAN_FRAC - 1e-9 or flown_s < _SPAN_S:
+        if used_frac < _SPAN_FRAC - 1e-9:
             return None
-        self._since = now_s, battery_frac
+        if flown_s < _SPAN_S:
+            self.least_1_s = used_frac / (flown_s + _LATE_S)
+            return None
+        self._since, self.least_1_s = (now_s, battery_frac), None
         return used_frac / flown_s
 
 

@@ -37,13 +37,12 @@ class FieldTasking(Tasking):
         super().__init__(context, make_rule)
         self._sortie = self._flights.meter.sortie
         context.airway.when_departed = self._depart_late
-        self._visits = BaseVisits(context, self._flights, self._sortie, self._visit_over)
+        self.visits = BaseVisits(context, self._flights, self._sortie, self._visit_over)
+        """What it does at bases, and is told of them."""
         self._limits = TimeLimits(context, self._flights, self._sortie)
         self._refused_bases = RefusedTasks(context.timing.reconsider_s)
-        known = self._flights, self._sortie, self._visits
+        known = self._flights, self._sortie, self.visits
         self._havens = Havens(context, *known, self._refused_bases)
-        self._departed_from: str | None = None
-        """The base that it has just been sent off from, until it has arrived anywhere."""
         self._drained = False
         """Whether the battery was found to last otherwise, and nothing has followed yet."""
         self._home_at_s: float | None = None
@@ -59,7 +58,7 @@ class FieldTasking(Tasking):
         """The vehicle takes targets: as in a plain mission, or on to an earlier life's base."""
         self._flights.meter.begin(now_s)
         me, claim = self._mission_view.me, self._replica.claims.get(self._uav)
-        self._visits.leave_ground()
+        self.visits.leave_ground()
         if me is not None:
             self._sortie.begin(me, self._mission_view.mission_s(now_s))
         visits = claim is not None and claim.stage in (BaseStage.APPROACHING, BaseStage.WAITING)
@@ -68,7 +67,7 @@ class FieldTasking(Tasking):
             return
         self._machine.take(Trigger.VEHICLE_READY)
         self._become_free(self._mission_view.mission_s(now_s))
-        if claim is None or not self._visits.resume(claim, now_s):
+        if claim is None or not self.visits.resume(claim, now_s):
             self._say_idle()
 
     def recall(self, claim: Claim) -> None:
@@ -77,7 +76,7 @@ class FieldTasking(Tasking):
 
     def stand(self, now_s: float, *, found: bool = False) -> bool:
         """Whether it stands at a base, by its last claim or as it was found: stay there."""
-        return self._flights.problem is not None and self._visits.stand(now_s, found=found)
+        return self._flights.problem is not None and self.visits.stand(now_s, found=found)
 
     def zones_changed(self) -> bool:
         """Whether other zones are in force than when this was last asked."""
@@ -85,7 +84,7 @@ class FieldTasking(Tasking):
 
     def way_home(self) -> HomeFlight | None:
         """From where the UAV is to the nearest base or its own start; None in a plain mission."""
-        name = self._visits.stands_at
+        name = self.visits.stands_at
         base = None if name is None else self._flights.base(name)
         if base is None:
             return self._flights.way_home()
@@ -101,43 +100,29 @@ class FieldTasking(Tasking):
             return
         if leg != self._flights.leg:
             return
-        self._departed_from = None
+        self.visits.flown()
         task = self._task()
         if state is AgentState.FLYING_TO_BASE:
-            self._visits.arrive(now_s)
+            self.visits.arrive(now_s)
         elif state is AgentState.SERVING and task is not None:
             self._end_line(task, now_s)
         elif task is not None and self._machine.take(Trigger.ARRIVED):
             self._await_opening(task, now_s)
 
-    def touch_down(self, leg: int, now_s: float) -> None:
-        """The vehicle stands at the base where it was to land."""
-        self._visits.touch_down(leg, now_s)
-
-    def swapped(self, leg: int, now_s: float) -> None:
-        """The vehicle has a full battery."""
-        self._visits.swapped(leg, now_s)
-
-    def let_start(self) -> bool:
-        """Somebody has seen to the vehicle; whether it stands on a slot and is told so."""
-        return self._visits.let_start()
-
     def refuse(self, leg: int, reason: str, now_s: float, *, passes: bool = False) -> None:
         """The vehicle will not fly that leg, or not land: leave its aim alone for a while."""
         if leg != self._flights.leg:
             return
-        claim, from_base, self._departed_from = self.claim, self._departed_from, None
-        base = None if from_base is None else self._flights.base(from_base)
+        claim, base = self.claim, self.visits.flown()
         visits = self._machine.state in VISITS_BASE
         if visits and claim is not None and claim.base is not None:
             self._refused_bases.add(claim.base, now_s)
         if base is not None:
             if claim is not None and claim.task is not None:
                 self._refused.add(claim.task, now_s, passes=passes)
-            self._become_free(self._mission_view.mission_s(now_s))
-            self._visits.stay(base, now_s)
+            self.visits.stay(base, now_s)
         elif visits:
-            self._visits.break_off(f"vehicle refused: {reason}", now_s)
+            self.visits.break_off(f"vehicle refused: {reason}", now_s)
         else:
             super().refuse(leg, reason, now_s, passes=passes)
 
@@ -155,9 +140,9 @@ class FieldTasking(Tasking):
     def advance_in_field(self, now_s: float) -> None:
         """What follows from constraints and the time, in a running mission, before `advance`."""
         if self._in_field:
-            self._visits.advance(now_s)
+            self.visits.advance(now_s)
             if (haven := self._havens.instead_of_waiting(now_s)) is not None:
-                self._visits.break_off("another base is ready earlier", now_s)
+                self.visits.break_off("another base is ready earlier", now_s)
                 self._visit_base(haven, now_s)
             self._depart_if_due(now_s)
             self._begin_if_due(now_s)
@@ -169,7 +154,7 @@ class FieldTasking(Tasking):
         """When `advance` or `spent` will next have something to do."""
         waits = self._machine.state in WITHOUT_AIM | {AgentState.ABOVE_BASE}
         home_at_s = self._home_at_s if waits else None
-        return earliest(super().next_deadline_s(), home_at_s, self._visits.next_deadline_s())
+        return earliest(super().next_deadline_s(), home_at_s, self.visits.next_deadline_s())
 
     # -- deciding ------------------------------------------------------------------------
 
@@ -214,9 +199,9 @@ class FieldTasking(Tasking):
         return replace(
             turn,
             sortie_end_s=self._sortie.end_s,
-            landed_at=self._visits.stands_at,
-            parked=self._visits.stands_at is not None and self._visits.is_parked,
-            blocking=self._visits.blocking(),
+            landed_at=self.visits.stands_at,
+            parked=self.visits.stands_at is not None and self.visits.is_parked,
+            blocking=self.visits.blocking(),
         )
 
     def _field_rule(self, epoch: PlanEpoch) -> FieldRule | None:
@@ -237,7 +222,7 @@ class FieldTasking(Tasking):
         left: str | None = None,
     ) -> None:
         task = self._replica.board[str(decision.task)]
-        standing = self._visits.claim if self._visits.stands_at is not None else None
+        standing = self.visits.claim if self.visits.stands_at is not None else None
         self._begin_attempt(now_s, left)
         ends_s = decision.sortie_end_s
         claim = Claim(
@@ -274,7 +259,7 @@ class FieldTasking(Tasking):
         self._free.to_decide = False
         times_s = haven.arrives_s, haven.ready_s, now_s
         to = haven.way, haven.base.id
-        self._visits.set_off(*to, since_s, self._rank, *times_s, beside=haven.beside)
+        self.visits.set_off(*to, since_s, self._rank, *times_s, beside=haven.beside)
 
     def _visit_over(self, since_s: float, adrift: bool) -> None:
         self._become_free(since_s, adrift=adrift)
@@ -301,7 +286,7 @@ class FieldTasking(Tasking):
         if way is None:
             self._release("zones leave no way", now_s)
             return False
-        if self._visits.stands_at is not None:
+        if self.visits.stands_at is not None:
             self._machine.take(Trigger.DEPARTED)
             self._leave_ground(now_s)
             self._announcer.explain("")
@@ -321,10 +306,22 @@ class FieldTasking(Tasking):
 
     def _leave_ground(self, now_s: float) -> None:
         me = self._mission_view.me
-        self._departed_from = self._visits.leave_ground()
-        if self._departed_from is not None and me is not None:
+        if self.visits.leave_ground() and me is not None:
             self._flights.meter.take_off(now_s)
             self._sortie.depart(me, self._mission_view.mission_s(now_s))
+
+    def _release(self, reason: str, now_s: float) -> None:
+        """Give the task up; who waits for its way from a base stays on the ground there."""
+        claim, base = self.claim, self.visits.stand_still()
+        if claim is None or base is None:
+            super()._release(reason, now_s)
+            return
+        self._note("released", str(claim.task), reason=reason)
+        self.visits.stay(base, now_s)
+
+    def _withdraw(self, phase: ClaimPhase, now_s: float, *, handed_over: bool) -> None:
+        self.visits.stand_still()
+        super()._withdraw(phase, now_s, handed_over=handed_over)
 
     def _depart_if_due(self, now_s: float) -> None:
         departs_at_s, task, claim = self._attempt.departs_at_s, self._task(), self.claim
@@ -404,7 +401,7 @@ class FieldTasking(Tasking):
             return
         self._home_at_s = None
         if state in (AgentState.FLYING_TO_BASE, AgentState.ABOVE_BASE):
-            self._visits.reroute(now_s)
+            self.visits.reroute(now_s)
         elif state in (AgentState.FLYING, AgentState.DEPARTING) and task is not None:
             self._reroute_to(task, claim, now_s)
         elif state is AgentState.SERVING and task is not None:
@@ -432,7 +429,7 @@ class FieldTasking(Tasking):
     # -- without a task ------------------------------------------------------------------------
 
     def _situated(self, claim: Claim) -> Claim:
-        return claim if self._flights.problem is None else self._visits.situated(claim)
+        return claim if self._flights.problem is None else self.visits.situated(claim)
 
     def _stay_idle(self, now_s: float) -> None:
         if self._machine.state is AgentState.READY_ON_GROUND:
@@ -441,7 +438,7 @@ class FieldTasking(Tasking):
         if self._flights.problem is None:
             return
         if not self._free.awaits_peers:
-            self._visits.park()
+            self.visits.park()
         until_s = self._refused_bases.left_alone(now_s).values()
         self._free.retry_at_s = earliest(self._free.retry_at_s, *until_s)
 
@@ -457,7 +454,7 @@ class FieldTasking(Tasking):
             return
         if self._machine.state is AgentState.ABOVE_BASE:
             self._home_at_s = None
-            self._visits.come_down(now_s)
+            self.visits.come_down(now_s)
             return
         home = self._havens.home(now_s)
         idles = self._machine.state is AgentState.IDLE
@@ -469,7 +466,7 @@ class FieldTasking(Tasking):
 
     def _leaves_at_s(self, now_s: float) -> float | None:
         """When it has to head home from where it is, on the own clock; None: never."""
-        stands = self._visits.stands_at is not None
+        stands = self.visits.stands_at is not None
         seeks = self._machine.state in WITHOUT_AIM and not stands
         return self._limits.leaves_at_s(self._havens.home(now_s) if seeks else None, stands, now_s)
 
@@ -477,7 +474,7 @@ class FieldTasking(Tasking):
         """Why the UAV has to fly home for good: its battery; None if it need not."""
         if self._flights.problem is None:
             return None
-        if self._visits.is_hopeless(now_s):
+        if self.visits.is_hopeless(now_s):
             return "its battery is used up, and the slots of its base are blocked"
         if self._machine.state in PAUSED_BY_OPERATOR:  # nothing else looks at the time there
             self._home_at_s = self._leaves_at_s(now_s)

@@ -297,7 +297,7 @@ class FleetAir:
     def ends_too_late(self, wish: Wish, sortie_end_s: float) -> bool:
         """Whether its way, set off on now, would end when it must have landed already."""
         me = self._mission_view.me
-        return me is not None and self._mission_s + _way_s(wish, me) > sortie_end_s
+        return me is not None and self.mission_s + _way_s(wish, me) > sortie_end_s
 
     def can_fly(self, wish: Wish, path_enu_m: Sequence[Point], sortie_end_s: float) -> bool:
         """Whether its battery lasts for a way home that climbs into another layer first."""
@@ -313,7 +313,7 @@ class FleetAir:
             ).sum()
         )
         more_s = (_MOST_OF_RESERVE - _OF_RESERVE) * self._reserve_s(me)
-        return self._mission_s <= self.sets_off_by_s(wish, sortie_end_s, climb_s) + more_s
+        return self.mission_s <= self.sets_off_by_s(wish, sortie_end_s, climb_s) + more_s
 
     def _reserve_s(self, me: UavSpec) -> float:
         """How long its reserve lasts [s], as fast as its battery has been found to drain."""
@@ -331,7 +331,7 @@ class FleetAir:
         if self._zone_stay.lasts_s(wish.corners_enu_m[0]) > LEAVES_ZONE_S:
             return True
         waited_s = self._mission_view.now_s - wish.since_s
-        late = self._mission_s + retry_s > self.sets_off_by_s(wish, sortie_end_s)
+        late = self.mission_s + retry_s > self.sets_off_by_s(wish, sortie_end_s)
         return late and wish.task is None and waited_s > _TRIES * retry_s
 
     def way_out(self, wish: Wish, retry_s: float) -> Wish | None:
@@ -362,7 +362,7 @@ class FleetAir:
         """``claim`` of who holds its slot until it really takes off."""
         if claim.task is None:
             return replace(claim, base=base, stage=stage)
-        return replace(claim, base=base, stage=stage, departs_s=self._mission_s)
+        return replace(claim, base=base, stage=stage, departs_s=self.mission_s)
 
     def _in_layer(self, wish: Wish, layer_m: float) -> tuple[Point, ...]:
         """The corners of a way with its ends in the layer: to be climbed to and left upright.
@@ -392,7 +392,7 @@ class FleetAir:
             if uav.id == self._uav or uav.id in present:
                 self._lost_s.pop(uav.id, None)
             else:
-                self._lost_s.setdefault(uav.id, self._mission_s)
+                self._lost_s.setdefault(uav.id, self.mission_s)
 
     def expired(self) -> set[str]:
         """Who was lost so long ago that it can't be in the air any more.
@@ -406,7 +406,7 @@ class FleetAir:
             uav.id
             for uav in self._brief.uavs
             if uav.id in self._lost_s
-            and self._mission_s - self._lost_s[uav.id]
+            and self.mission_s - self._lost_s[uav.id]
             > (ENDLESS_S if endless or uav.endurance_s is None else uav.endurance_s)
         }
 
@@ -488,7 +488,8 @@ class FleetAir:
         return min(found)[-1] if found else None
 
     @property
-    def _mission_s(self) -> float:
+    def mission_s(self) -> float:
+        """Mission time of the step that is under way [s]."""
         return self._mission_view.mission_s(self._mission_view.now_s)
 
 

@@ -144,7 +144,7 @@ class GroundStation(AgentPart):
     def _let_start(self) -> tuple[StationVerdict, str]:
         if self._machine.state in (AgentState.READY_ON_GROUND, AgentState.DEPARTING):
             return _DONE
-        if self._tasking.let_start():
+        if self._tasking.visits.let_start():
             return _DONE
         return StationVerdict.NOT_NOW, "it does not stand at a base for another battery"
 

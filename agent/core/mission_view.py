@@ -55,6 +55,8 @@ class MissionView:
         """When the vehicle last told where it is, by the same clock."""
         self.raised_m = 0.0
         """How much higher it flies than in its layer in the brief, where layers are shared [m]."""
+        self.waits_on_ground = False
+        """Whether it has been sent off from where it stands, and waits there for its way."""
         self._below_m: float | None = None
         """How much lower than the vehicle that place is [m]; None: its layer was not known."""
         self._place_enu_m: Point | None = None
@@ -178,6 +180,8 @@ class MissionView:
         """The vehicle has told where it is."""
         east_m, north_m, up_m = telemetry.position_enu_m
         self.telemetry, self._moved_s = telemetry, self.now_s
+        if self.waits_on_ground:  # its next way begins straight above that
+            return
         layer_m = 0.0 if self._out_of_layer else self._layer_m
         self._place_enu_m = east_m, north_m, up_m - layer_m
         self._below_m = None if self.me is None else layer_m

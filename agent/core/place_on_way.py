@@ -17,12 +17,17 @@ _BESIDE_M = 5.0
 
 
 class PlaceOnWay:
-    """The place of one vehicle that may be sent off, and told to stop, between two words of it."""
+    """The place of one vehicle that may be sent off, and told to stop, between two words of it.
 
-    def __init__(self) -> None:
+    Args:
+        patience_s: so long at most an order waits for it to say where it is [s].
+    """
+
+    def __init__(self, patience_s: float) -> None:
+        self._patience_s = patience_s
         self.enu_m: Point | None = None
         """Where it is, or would be stopped [m; mission origin]; None: nobody knows."""
-        self.awaited_since_s = math.inf
+        self._awaited_since_s = math.inf
         """Since when an order has waited until that is known [s]."""
         self._rises_to_enu_m: Point | None = None
         """Where it comes first from the ground [m]; None: it is in the air, or was not sent off."""
@@ -40,12 +45,17 @@ class PlaceOnWay:
         """It is sent on a way that begins there, where it hovers, or above where it stands."""
         self.enu_m, self._rises_to_enu_m = begins_enu_m, begins_enu_m if from_ground else None
 
-    def is_awaited(self, now_s: float, patience_s: float) -> bool:
-        """Whether an order has to wait, for so long at most, until it is known where it flies."""
+    def is_awaited(self, now_s: float) -> bool:
+        """Whether an order has to wait until it is known where it flies."""
         if self.enu_m is not None:
             return False
-        self.awaited_since_s = min(self.awaited_since_s, now_s)
-        return now_s < self.awaited_since_s + patience_s
+        self._awaited_since_s = min(self._awaited_since_s, now_s)
+        return now_s < self.awaited_until_s
+
+    @property
+    def awaited_until_s(self) -> float:
+        """Until when it waits at most [s]; endless as long as none does."""
+        return self._awaited_since_s + self._patience_s
 
     def land(self) -> None:
         """It is on the ground, wherever it said that it was last."""

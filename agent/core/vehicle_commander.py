@@ -107,9 +107,9 @@ class VehicleCommander(AgentPart):
                     self._announcer.explain("")
                 self._tasking.arrive(leg, now_s)
             case Landed(leg):
-                self._tasking.touch_down(leg, now_s)
+                self._tasking.visits.touch_down(leg, now_s)
             case Swapped(leg):
-                self._tasking.swapped(leg, now_s)
+                self._tasking.visits.swapped(leg, now_s)
             case AttemptFailed(leg):
                 self._tasking.fail(leg)
             case Telemetry():

@@ -49,7 +49,7 @@ from swarm.protocol.events import (
 from swarm.protocol.field_messages import UavReady, ZoneEdit
 from swarm.protocol.membership import Membership
 from swarm.protocol.messages import Message, Snapshot, StartWithout, TaskEdit
-from swarm.protocol.operator_commands import zone_edits
+from swarm.protocol.operator_commands import anything_said, zone_edits
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import StallDetector, Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import Claim, ClaimPhase, Status, StatusPhase
@@ -327,7 +327,11 @@ class CoordinatorCore:
         if found.is_open:
             self._state_query.want(now_s, before_deciding=True)
             return
-        if found.is_followed or self._comes_too_late(found.inherited):
+        if (
+            found.is_followed
+            or self._comes_too_late(found.inherited)
+            or self._forgets_words(found.inherited)
+        ):
             self._adopt(found.inherited, now_s)
         if self._announcer.observe([*found.theirs, *overheard]):
             self._actions += self._announcer.restate()
@@ -344,6 +348,17 @@ class CoordinatorCore:
         """
         begins = self.stage is MissionStage.BRIEFED
         return begins and inherited.has_ended and self._mission.gate.is_for_nobody
+
+    def _forgets_words(self, inherited: InheritedState) -> bool:
+        """Whether it has begun a flight though one was begun that the operator has spoken about.
+
+        Nobody has answered its first question, then; no flight but that one has those words.
+        """
+        theirs, own = inherited.replica.brief, self.replica.brief
+        begins = self.stage is MissionStage.BRIEFED and inherited.replica.epoch is None
+        if not begins or theirs is None or own is None or theirs.run == own.run:
+            return False
+        return anything_said(self.replica, theirs.run) and not anything_said(self.replica, own.run)
 
     def _join(self, inherited: InheritedState) -> None:
         """Take in what all but coordinators have said: this one speaks for itself."""

@@ -8,8 +8,8 @@ mission is aborted holds whatever is said to a single UAV afterwards.
 from __future__ import annotations
 
 from swarm.model.ids import FLEET
-from swarm.protocol.field_messages import ZoneEdit, ZoneSpec
-from swarm.protocol.messages import CommandKind, OperatorCommand, Stamp, StartWithout
+from swarm.protocol.field_messages import UavReady, ZoneEdit, ZoneSpec
+from swarm.protocol.messages import CommandKind, OperatorCommand, Stamp, StartWithout, TaskEdit
 from swarm.protocol.registers import Replica
 
 BEING_STOPPED = "being stopped, "
@@ -25,6 +25,18 @@ _WORDS = {
     CommandKind.RETURN: "sent home by the operator",
     CommandKind.ABORT: "aborted by the operator",
 }
+
+
+def anything_said(replica: Replica, run: int) -> bool:
+    """Whether the operator has said anything about the flight of that number."""
+    words: list[OperatorCommand | TaskEdit | StartWithout | ZoneEdit | UavReady] = [
+        *(command for _, command in replica.commands.values()),
+        *replica.task_orders.values(),
+        *replica.starts.values(),
+        *replica.zone_edits.values(),
+        *(ready for _, ready in replica.readies.values()),
+    ]
+    return any(word.run == run for word in words)
 
 
 def in_force(replica: Replica) -> dict[str, OperatorCommand]:

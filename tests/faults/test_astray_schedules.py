@@ -23,6 +23,8 @@ BROKEN_ONCE = {
     5005804: "the judge allowed no time for a way out of a zone to be granted",
     5010244: "the judge took the height of a task for one above the layers",
     6003017: "who waited for its way home after the mission had ended looked at its charge no more",
+    7000079: "a fast drain was measured only after a way that was as long as that takes",
+    7000213: "a coordinator begun anew forgot what the operator had said before the start",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

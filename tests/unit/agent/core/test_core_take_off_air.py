@@ -130,15 +130,15 @@ def test_who_was_flying_home_in_an_earlier_life_goes_on_once_it_is_known_where_i
 
 
 def test_who_waits_for_a_word_of_where_it_is_waits_no_longer_than_for_an_answer() -> None:
-    place = PlaceOnWay()
+    place = PlaceOnWay(2.5)
 
-    assert place.is_awaited(10.0, 2.5)
-    assert place.is_awaited(12.4, 2.5)
-    assert not place.is_awaited(12.5, 2.5)
+    assert place.is_awaited(10.0)
+    assert place.is_awaited(12.4)
+    assert not place.is_awaited(12.5)
 
 
 def test_who_leaves_the_ground_is_taken_to_be_where_its_way_begins_until_it_is_up() -> None:
-    place = PlaceOnWay()
+    place = PlaceOnWay(2.5)
     place.tell((30.0, 50.0, 0.0))
 
     place.set_off((30.0, 50.0, 70.0), from_ground=True)

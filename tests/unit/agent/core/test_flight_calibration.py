@@ -158,7 +158,10 @@ def test_a_sortie_that_drains_as_planned_is_as_it_was() -> None:
 def test_a_drain_is_measured_whatever_the_steps_in_which_charge_is_told(
     endurance_s: float, drain_frac: float, phase_s: float, data: st.DataObject
 ) -> None:
-    """Told in whole per cent, twice a second and up to a second late: at most 10 % off."""
+    """Told in whole per cent, twice a second and up to a second late: at most 10 % off.
+
+    What a shorter span says of it at least is never too much.
+    """
     gauge = DrainGauge()
     late_s = data.draw(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=8))
     votes, told_at_s = [], phase_s
@@ -168,9 +171,23 @@ def test_a_drain_is_measured_whatever_the_steps_in_which_charge_is_told(
         left_frac = 1.0 - told_at_s * drain_frac / endurance_s
         used_1_s = gauge.read(math.ceil(100.0 * left_frac) / 100.0, now_s)
         votes += [] if used_1_s is None else [used_1_s * endurance_s]
+        least_frac = (gauge.least_1_s or 0.0) * endurance_s
+        assert least_frac <= drain_frac * (1.0 + 1e-9)
 
     assert votes or 200.0 * drain_frac / endurance_s < 0.06 or endurance_s / drain_frac < 30.0
     assert all(abs(vote / drain_frac - 1.0) < 0.1 for vote in votes), votes
+
+
+def test_a_fast_drain_is_known_in_part_before_a_span_is_long_enough() -> None:
+    gauge = DrainGauge()
+    for at_s, frac in ((0.0, 0.9), (1.0, 0.88), (2.0, 0.86)):
+        gauge.read(frac, at_s)
+    assert gauge.least_1_s is None  # 2 % in a second
+
+    assert gauge.read(0.68, 11.0) is None
+    assert gauge.least_1_s == pytest.approx(0.2 / 12.0)
+    assert gauge.read(0.48, 21.0) == pytest.approx(0.02)
+    assert gauge.least_1_s is None
 
 
 def test_a_drain_is_measured_anew_in_each_flight_and_with_each_battery() -> None:

@@ -20,7 +20,7 @@ from swarm.protocol.events import (
 )
 from swarm.protocol.messages import MissionConfig, MissionPhase, PlanEpoch, Snapshot, TaskEntry
 from swarm.protocol.timing import Timing
-from tests.support.builders import IDLE, OUT, done, epoch, held, message, mission, task
+from tests.support.builders import IDLE, OUT, done, epoch, held, message, mission, order, task
 from tests.support.earlier_life import (
     EXTRA,
     FLOWN,
@@ -256,6 +256,36 @@ def test_a_beginning_that_was_cut_short_goes_on_with_the_same_run() -> None:
 
     coordinator.started()
     assert coordinator.phase is MissionPhase.RUNNING
+
+
+def test_a_beginning_that_the_operator_has_spoken_about_is_gone_on_with_though_found_late() -> None:
+    """Nobody answers the first question of a life that remembers nothing."""
+    added = order("added", run=RUN)
+    coordinator = LoneCoordinator(FLOWN, incarnation=600)
+    assert said(coordinator.log, MissionConfig)[0].run != RUN
+    ready = answer(registers())
+    ready = replace(ready, messages=(*registers(), message("operator", added, 1)))
+
+    coordinator.answers = [ready]
+    coordinator.see("u0")
+
+    assert said(coordinator.log, MissionConfig)[-1].run == RUN
+    assert "added" in coordinator.core.replica.board
+    coordinator.see("u1")
+    for name in ("u0", "u1"):
+        coordinator.hear(name, IDLE)
+    assert "added" in [t.id for t in plans_wanted(coordinator.log)[-1].mission.tasks]
+
+
+def test_one_that_nobody_has_said_anything_about_is_begun_anew() -> None:
+    coordinator = LoneCoordinator(FLOWN, incarnation=600)
+    (own,) = said(coordinator.log, MissionConfig)
+    ready = replace(answer(registers()), messages=tuple(registers()))
+
+    coordinator.answers = [ready]
+    coordinator.see("u0")
+
+    assert said(coordinator.log, MissionConfig)[-1].run == own.run
 
 
 # -- its own memory ---------------------------------------------------------------------
