@@ -15,6 +15,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 
+from agent.core.base_stand import BaseStand
 from agent.core.fleet_air import ASIDE_PATIENCE, GIVES_UP_S, STOP_LEG, FleetAir, Wish
 from agent.core.interface import (
     Action,
@@ -43,7 +44,7 @@ from swarm.protocol.events import LogLine
 from swarm.protocol.fields import Point
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
-from swarm.protocol.uav_messages import BaseStage, Claim, ClaimedWay, ClaimPhase
+from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, adds_nothing
 from swarm.separation.shifted import hovering, landed, left_of_way, lifted, nominal
 
@@ -89,14 +90,10 @@ class Airway:
         self._aside: Wish | None = None
         """It makes room, before its wish is asked again."""
         self._kept = KeptAir(uav)
-        self._stands_at: tuple[str, BaseStage] | None = None
-        """Where it stands until its way up is granted."""
+        self._stand = BaseStand()
         self._lifts_enu_m: Point | None = None
         """Where it will be in the air that stands on the ground, in its own layer [m]."""
-        self._settled: tuple[object, ...] = ()
-        """What the last look rested on."""
-        self._left_base = False
-        """Whether it has taken off from there since it last said anything."""
+        self._settled: tuple[object, ...] = ()  # what the last look rested on
         self._comes_down = False
         """Whether it lands where it is, whatever home it is told to return to."""
         self._looks_again = False
@@ -117,7 +114,7 @@ class Airway:
     @property
     def waits_on_ground(self) -> bool:
         """Whether that order is to take the vehicle up from the base where it stands."""
-        return self._wish is not None and self._stands_at is not None
+        return self._wish is not None and self._stand.waits
 
     # -- what the vehicle says -----------------------------------------------------------------
 
@@ -200,6 +197,8 @@ class Airway:
             if way.flies and order.via_enu_m is not None:  # on its way up it has no other air
                 order = replace(order, path_enu_m=(), via_enu_m=way.path_enu_m[-1])
             here = None
+        elif isinstance(order, Return) and order.resume and self._vehicle.has_flown(way, order):
+            here = None  # told so by an earlier life, it lands there by itself
         elif here is None and self._aloft and self._vehicle.is_awaited(self._mission_view.now_s):
             again = partial(self.order, own_height=own_height, fixed=fixed, takes_s=takes_s)
             self._unplaced = partial(again, order)
@@ -219,7 +218,7 @@ class Airway:
         if self._rises:
             self._actions.append(LogLine("asks for the air above its start", {}))
         if not self._aloft:
-            self._stands_at = self._stands_at or self._fleet.standing()
+            self._stand.wait(self._replica.claims.get(self._uav))
         elif self._moves and not self._stops:
             left = None
             if self._own_height == own_height and self._vehicle.enu_m is not None:
@@ -231,6 +230,12 @@ class Airway:
                 self._way = left
                 self._depart(self._wish)
                 self._wish = None
+
+    @property
+    def stop_enu_m(self) -> Point | None:
+        """Where the vehicle can be stopped, in the layer of the brief [m]; None: as it tells."""
+        here = self._vehicle.enu_m if self._shared is not None and self._aloft else None
+        return None if here is None else self._nominal(here)
 
     def _drop_wish(self) -> None:
         """Nothing is asked for any more."""
@@ -275,8 +280,7 @@ class Airway:
         """``claim`` with the air that this UAV takes or asks for."""
         if self._shared is None:
             return claim
-        if self._stands_at is not None and claim.base is None:
-            claim = self._fleet.still_standing(claim, *self._stands_at)
+        claim = self._stand.told(claim, self._fleet.mission_s)
         way = self._told_way
         if claim.phase is ClaimPhase.OUT and way.grounded and not self._rises:
             way = landed(way)  # it will not take off any more
@@ -289,8 +293,8 @@ class Airway:
         Returns:
             Orders that are given up, since no way becomes free, or advice to land where it is.
         """
-        air, claim = self._shared, self._replica.claims.get(self._uav)
-        if air is None or claim is None or not self._has_changed(now_s):
+        air = self._shared
+        if air is None or self._uav not in self._replica.claims or not self._has_changed(now_s):
             return []
         if self._unplaced is not None and not self._vehicle.is_awaited(now_s):
             self._unplaced()
@@ -321,10 +325,7 @@ class Airway:
         claim = self._replica.claims.get(self._uav)
         if self._shared is None or claim is None:
             return None
-        now, until_s = claim, claim.sortie_end_s and self.sortie_end_s()
-        if self._left_base and claim.task is not None and claim.departs_s is not None:
-            now = replace(now, base=None, stage=None, departs_s=None, sortie_end_s=until_s)
-        now, self._left_base = self.told(now), False
+        now = self.told(self._stand.left(claim, self.sortie_end_s()))
         if adds_nothing(now.way, claim.way) and (now.base, now.stage) == (claim.base, claim.stage):
             return None
         return now
@@ -463,10 +464,9 @@ class Airway:
             self._way = replace(way, flies=True)
             self._actions.append(OrderVehicle(order))
             return
-        self._left_base |= self._stands_at is not None
+        self._stand.leave()
         self._moves, self._aloft = len(path) > 1, True
-        self._stands_at = self._lifts_enu_m = None
-        self._own_height = wish.own_height
+        self._lifts_enu_m, self._own_height = None, wish.own_height
         self._way = replace(way, flies=True, grounded=False)
         if wish.is_shorter_than(path):
             self.when_detoured()

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import accumulate, pairwise
 
 import numpy as np
@@ -22,7 +22,7 @@ from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig, UavSpec
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
-from swarm.protocol.uav_messages import MOST_CORNERS, BaseStage, Claim, ClaimedWay, ClaimPhase
+from swarm.protocol.uav_messages import MOST_CORNERS, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, air_of_brief, strength
 from swarm.separation.shifted import length_m, shifted_path
 from swarm.separation.slabs import apart
@@ -248,7 +248,8 @@ class FleetAir:
         for shift_m, corners in self.ways(air, wish, here.shift_m, aside=aside):
             start = here.path_enu_m[0] if here.path_enu_m else corners[0]
             path = shifted_path(start, corners, shift_m, wish.end_enu_m)
-            if sortie_end_s is not None and not self.can_fly(wish, path, sortie_end_s):
+            late = sortie_end_s is not None and not self.can_fly(wish, path, sortie_end_s)
+            if late or not self.layer.is_over(path):
                 continue
             array = np.array(path)
             if not air.can_grant(array, claims, expired, self.reaches, grounded=grounded):
@@ -349,20 +350,6 @@ class FleetAir:
             return None
         order, now_s = GoTo(STOP_LEG, there), self._mission_view.now_s
         return Wish(order, now_s, (here, there), out_of_layer=wish.out_of_layer)
-
-    def standing(self) -> tuple[str, BaseStage] | None:
-        """Base and stage of who stands there, by its own last word."""
-        claim = self._replica.claims.get(self._uav)
-        stands = claim is not None and claim.stage in (BaseStage.LANDED, BaseStage.PARKED)
-        return (
-            (claim.base, claim.stage) if stands and claim and claim.base and claim.stage else None
-        )
-
-    def still_standing(self, claim: Claim, base: str, stage: BaseStage) -> Claim:
-        """``claim`` of who holds its slot until it really takes off."""
-        if claim.task is None:
-            return replace(claim, base=base, stage=stage)
-        return replace(claim, base=base, stage=stage, departs_s=self.mission_s)
 
     def _in_layer(self, wish: Wish, layer_m: float) -> tuple[Point, ...]:
         """The corners of a way with its ends in the layer: to be climbed to and left upright.

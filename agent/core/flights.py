@@ -169,8 +169,14 @@ class Flights(AgentPart):
         self._mission_view.arrive(place_enu_m, own_height=task.height_m is not None)
 
     def zones_changed(self) -> bool:
-        """Whether other zones are in force than when this was last asked."""
+        """Whether other zones are in force than when this was last asked, and ways may be wrong.
+
+        Where UAVs are kept apart a way round what is gone is still the best: another one would have
+        to be asked for from a stop.
+        """
         before, self._zones = self._zones, zones_in_force(self._replica)
+        if self._keeps_apart and set(before).issuperset(self._zones):
+            return False
         return before != self._zones
 
     def nodes(self, task: str, *, backwards: bool) -> tuple[int, int] | None:
@@ -408,7 +414,7 @@ class Flights(AgentPart):
         telemetry, ground = self._mission_view.telemetry, self.ground
         if telemetry is None:
             return
-        here = telemetry.position_enu_m
+        here = self._airway.stop_enu_m or telemetry.position_enu_m
         there = self.way_out() or here
         via_enu_m: tuple[Point, ...] = ()
         if ground is not None and there[:2] != here[:2]:

@@ -3,14 +3,17 @@
 In its layer a UAV is as high above the place that it visits as the brief says, wherever that is. At
 a task that asks for a height of its own it is not, nor where it was stopped on a slant to one:
 whatever leads on from there, in any layer, leaves the layer of the brief out of its reckoning.
+And nobody is led lower than everything that is visited, whatever it was reckoned from.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Final
 
 from agent.core.mission_view import MissionView
 from swarm.protocol.fields import Point
+from swarm.protocol.messages import MissionConfig
 from swarm.protocol.registers import Replica
 
 _SLACK_M: Final = 2.0
@@ -48,6 +51,19 @@ class OwnLayer:
         me, brief = self._mission_view.me, self._replica.brief
         if me is None or brief is None or brief.terrain is not None:
             return False
+        low_m, high_m = self._visited_m(brief)
+        return not low_m - _SLACK_M <= place_enu_m[2] - me.layer_m <= high_m + _SLACK_M
+
+    def is_over(self, path_enu_m: Iterable[Point]) -> bool:
+        """Whether no corner of a way is lower than all that is visited [m]; over hills likewise."""
+        brief = self._replica.brief
+        if brief is None or brief.terrain is not None:
+            return True
+        low_m, _ = self._visited_m(brief)
+        return all(up_m >= low_m - _SLACK_M for *_, up_m in path_enu_m)
+
+    def _visited_m(self, brief: MissionConfig) -> tuple[float, float]:
+        """The lowest and the highest place on the ground [m; without layers]."""
         known = brief, self._replica.board_version
         if self._heights_of != known:
             up_m = [uav.position_enu_m[2] for uav in brief.uavs]
@@ -55,5 +71,4 @@ class OwnLayer:
             for task in self._replica.board.values():
                 up_m += [place[2] for place in (task.position_enu_m, *task.path_enu_m)]
             self._heights_of, self._heights_m = known, (min(up_m), max(up_m))
-        low_m, high_m = self._heights_m
-        return not low_m - _SLACK_M <= place_enu_m[2] - me.layer_m <= high_m + _SLACK_M
+        return self._heights_m

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import math
 
+from agent.core.interface import Return
 from swarm.protocol.fields import Point
+from swarm.protocol.uav_messages import ClaimedWay
 
 _UP_M = 2.0
 """Who is no farther below where its way begins has risen to there [m]."""
@@ -56,6 +58,16 @@ class PlaceOnWay:
     def awaited_until_s(self) -> float:
         """Until when it waits at most [s]; endless as long as none does."""
         return self._awaited_since_s + self._patience_s
+
+    def has_flown(self, way: ClaimedWay, home: Return) -> bool:
+        """Whether it is at the end of ``way``, which leads where ``home`` does, or lands there."""
+        here, above = self.enu_m, home.via_enu_m
+        if here is None or above is None or not (way.flies and way.path_enu_m):
+            return False
+        end = way.path_enu_m[-1]
+        if math.dist(end[:2], above[:2]) > _BESIDE_M or here[2] > end[2] + _UP_M:
+            return False
+        return math.dist(here[:2], end[:2]) <= _BESIDE_M
 
     def land(self) -> None:
         """It is on the ground, wherever it said that it was last."""

@@ -4,7 +4,8 @@ The same kind of survey is flown by fleets of several sizes, one after the other
 with the same rate of position reports, each watched for a while in the middle of its mission and
 ended. What processes use is read from the kernel: processor time, and memory as the proportional
 share of pages, since a fleet's processes share what they have imported. What is said is counted by
-an observer on the bus, decisions are timed by the agents themselves. Linux alone tells all of it.
+an observer on the bus. Decisions are timed by the agents, to the next target, and by that observer,
+to the next claim; with a separation a target may wait for its way. Linux alone tells all of it.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from rich.console import RenderableType
 from coordinator.mission_view.mission_state import MissionState
 from coordinator.recording.recorder import RecordedCore
 from coordinator.recording.records import RecordableFact
+from sim.bench.claim_delays import ClaimDelays
 from sim.bench.fleets import BAND_M, options_for, survey_mission
 from sim.bench.machine import cpu_s, share_bytes, this_machine
 from sim.bench.results import BenchResult, Progress, quantile, unheard
@@ -85,7 +87,9 @@ class ScaleRun:
     received_hz: Mapping[str, float]
     """By kind, messages that each agent hears."""
     latency_ms: tuple[float, ...]
-    """From each arrival, or end of service, until the next target was sent."""
+    """From each arrival, or end of service, until the next target was sent, its way granted."""
+    told_ms: tuple[float, ...]
+    """From each end of service until an observer has heard what the UAV claims next."""
     lost: int
     """UAVs that the observer took for lost, though no process had ended."""
     ended: int
@@ -145,6 +149,8 @@ class ScaleRun:
             **{name: getattr(self, name) for name in derived},
             "latency_p50_ms": self.latency_quantile_ms(0.5),
             "latency_p99_ms": self.latency_quantile_ms(0.99),
+            "told_p50_ms": quantile(self.told_ms, 0.5),
+            "told_p99_ms": quantile(self.told_ms, 0.99),
         }
 
 
@@ -177,6 +183,8 @@ class ScaleBench(BenchResult):
                 Column("p50", ".1f", "ms"),
                 Column("p99", ".1f", "ms"),
                 Column("decisions"),
+                Column("told p50", ".1f", "ms"),
+                Column("told p99", ".1f", "ms"),
                 Column("claims each", ".1f", none="-"),
                 Column("heard besides", ".1f", "/s"),
                 Column("nearest", ".1f", "m", none="-"),
@@ -195,6 +203,8 @@ class ScaleBench(BenchResult):
                     run.latency_quantile_ms(0.5),
                     run.latency_quantile_ms(0.99),
                     len(run.latency_ms),
+                    quantile(run.told_ms, 0.5),
+                    quantile(run.told_ms, 0.99),
                     run.claims_per_decision,
                     run.besides_hz,
                     run.nearest_m,
@@ -256,18 +266,21 @@ class MessageCount:
         self.there: set[str] = set()
         """UAVs that have told their status."""
         self.latency_ms: list[float] = []
+        self.claim_delays = ClaimDelays()
+        self._mission_state: MissionState | None = None
 
     def around(
         self, core: Core[CommonEvent, CommonAction], mission_state: MissionState
     ) -> Core[CommonEvent, CommonAction]:
         """``core``, with what it hears counted."""
+        self._mission_state = mission_state
         return RecordedCore(core, self, mission_state)
 
     def note(self, what: RecordableFact, now_s: float) -> None:
         """Count it, if it is a message."""
-        del now_s
         if isinstance(what, MessageReceived):
-            said = what.message
+            said, state = what.message, self._mission_state
+            self.claim_delays.hear(said, None if state is None else state.mission_s(now_s))
             self.heard[said.writer != COORDINATOR, NAMES[type(said.body)]] += 1
             if isinstance(said.body, Status):
                 self.there.add(said.writer)
@@ -347,6 +360,7 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
         published_hz=published_hz(said, n_uav, watched_s),
         received_hz=received_hz(said, n_uav, watched_s),
         latency_ms=tuple(count.latency_ms),
+        told_ms=tuple(count.claim_delays.told_ms),
         lost=lost,
         ended=ended,
         load=os.getloadavg()[0],

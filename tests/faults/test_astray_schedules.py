@@ -25,6 +25,9 @@ BROKEN_ONCE = {
     6003017: "who waited for its way home after the mission had ended looked at its charge no more",
     7000079: "a fast drain was measured only after a way that was as long as that takes",
     7000213: "a coordinator begun anew forgot what the operator had said before the start",
+    9002971: "an agent begun anew while its vehicle landed at home stopped it there, on the ground",
+    9003249: "who flew to its base stopped for a zone that was taken away",
+    9004022: "who lost its task right after take-off was stopped where it had stood, underground",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

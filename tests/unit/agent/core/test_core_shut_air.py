@@ -155,3 +155,24 @@ def test_who_finds_no_way_out_of_a_zone_lands_whatever_it_wished_meanwhile(
     assert isinstance(order, Return)
     assert order.land
     assert "lands where it is" in notes(agent.log)
+
+
+def test_who_flies_round_a_zone_goes_on_round_where_it_was_once_that_is_gone(
+    script: Script,
+) -> None:
+    """Another way has to be asked for from a stop, which takes longer than it saves."""
+    fleet = Fleet(entry("t0", 100.0))
+    agent = fleet.agent
+    script.items = ["t0"]
+    agent.drawn(square("between", 50.0, 0.0), 1.0)
+    round_it = agent.flight
+    assert round_it.task == "t0"
+    assert round_it.via_enu_m
+    agent.be_at((20.0, 0.0, 10.0), None, 20.0)
+    before = len(orders(agent.log))
+
+    agent.drawn(square("between", 50.0, 0.0), 21.0, withdrawn=True)
+    assert orders(agent.log)[before:] == []
+
+    agent.drawn(square("between", 60.0, 0.0), 22.0)
+    assert fleet.flights(before)[0].leg == STOP_LEG

@@ -149,3 +149,38 @@ def test_who_leaves_the_ground_is_taken_to_be_where_its_way_begins_until_it_is_u
     assert place.enu_m == (30.5, 50.0, 69.0)
     place.tell((30.5, 50.0, 40.0))
     assert place.enu_m == (30.5, 50.0, 40.0)
+
+
+def test_who_has_flown_its_way_home_is_below_its_end_and_lands_by_itself() -> None:
+    home = Return("aborted", resume=True, via_enu_m=(40.0, 30.0, 25.0))
+    flown = ClaimedWay(7, ((0.0, 0.0, 36.0), (40.0, 30.0, 36.0)), flies=True, shift_m=11.0)
+    place = PlaceOnWay(2.5)
+    assert not place.has_flown(flown, home)  # nobody knows where it is
+
+    for place_enu_m, lands in (
+        ((20.0, 15.0, 36.0), False),
+        ((40.0, 29.0, 36.5), True),
+        ((40.0, 30.0, 12.0), True),
+        ((40.0, 30.0, 0.0), True),
+        ((40.0, 30.0, 60.0), False),
+    ):
+        place.tell(place_enu_m)
+        assert place.has_flown(flown, home) is lands, place_enu_m
+    place.tell((40.0, 30.0, 0.0))
+    assert not place.has_flown(replace(flown, flies=False), home)
+    assert not place.has_flown(flown, replace(home, via_enu_m=(0.0, 0.0, 25.0)))
+
+
+def test_a_later_life_leaves_a_vehicle_alone_that_lands_at_home_already() -> None:
+    earlier = in_the_air()
+    earlier.be_at((0.0, 0.0, 10.0), None)
+    earlier.hear(OPERATOR, OperatorCommand("u0", CommandKind.RETURN, 1, ""))
+    agent = earlier.reborn()
+    agent.see(COORDINATOR, "u1")
+    agent.learn_what_was_known_to(earlier)
+
+    agent.be_at((0.0, 0.0, 0.0), None)
+
+    assert [type(order) for order in orders(agent.log)] == [Return]
+    agent.happen(Home())
+    assert is_home(agent.core.replica.claims["u0"])

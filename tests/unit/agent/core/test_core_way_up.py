@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from agent.core.interface import GoTo, Hold, Return, Swap
+from agent.core.fleet_air import STOP_LEG
+from agent.core.interface import Arrived, GoTo, Hold, Return, Swap
 from agent.core.states import AgentState
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import CommandKind
@@ -20,9 +21,12 @@ NEXT_BASE = replace(FAR_BASE, id="b1", position_enu_m=(50.0, 30.0, 0.0))
 
 
 class WaitingOnGround:
-    """``u0`` has got a full battery at 70 s, and sets off; ``u1`` hovers above its base."""
+    """``u0`` has got a full battery at 70 s, and sets off; ``u1`` hovers above its base.
 
-    def __init__(self, script: Script, next_item: str) -> None:
+    Unless that one hovers elsewhere then.
+    """
+
+    def __init__(self, script: Script, next_item: str, then_enu_m: Point = ABOVE) -> None:
         self.agent = agent = FieldAgent("u1", bases=[BASE, NEXT_BASE])
         agent.brief = replace(agent.brief, separation_m=5.0, band_m=BAND_M)
         agent.fly_to(entry("t0", 100.0), entry("t1", 0.0))
@@ -30,14 +34,16 @@ class WaitingOnGround:
         agent.be_at((0.0, 0.0, 10.0), None)
         script.items = ["base:b0"]
         agent.start_mission()
-        agent.be_at(ABOVE, None, 49.0)
+        agent.be_at(agent.flight.position_enu_m, None, 49.0)
         agent.arrive(50.0)
         agent.touch_down(51.0)
-        self.other_is(ABOVE)
+        agent.be_at(ON_GROUND, None, 69.0)
+        self.other_is(then_enu_m)
         script.items = [next_item]
         self.since = len(orders(agent.log))
         agent.get_full(70.0)
-        agent.be_at(ON_GROUND, None, 70.5)
+        if then_enu_m == ABOVE:
+            agent.be_at(ON_GROUND, None, 70.5)
 
     def other_is(self, place_enu_m: Point, **claims: object) -> None:
         """The other one hovers there."""
@@ -134,3 +140,23 @@ def test_a_new_way_for_who_waits_on_the_ground_begins_in_its_layer_above(script:
     (flight,) = waiting.flights()
     assert in_band(flight)
     assert len(flight.via_enu_m) > 1
+
+
+def test_who_loses_its_task_right_after_it_was_sent_off_stops_above_its_base(
+    script: Script,
+) -> None:
+    """Its vehicle has not said yet that it has left the ground, where it came in a lower layer."""
+    waiting = WaitingOnGround(script, "t0", then_enu_m=FAR_AWAY)
+    agent = waiting.agent
+    assert [flight.task for flight in waiting.flights()] == ["t0"]
+
+    taken = {"phase": ClaimPhase.HELD, "task": "t0", "completion_s": 90.0}
+    waiting.other_is(FAR_AWAY, **taken)
+    assert agent.state() is AgentState.IDLE
+    assert waiting.flights()[-1].leg == STOP_LEG
+    agent.be_at(ABOVE, None, 71.0)
+    agent.happen(Arrived(STOP_LEG))
+    agent.run_until(75.0)
+
+    assert waiting.flights()[-1].position_enu_m[:2] == (50.0, 0.0)
+    assert all(in_band(flight) for flight in waiting.flights())

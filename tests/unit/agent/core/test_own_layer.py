@@ -106,3 +106,12 @@ def test_a_layer_lies_above_all_that_is_visited(script: Script, up_m: float, mis
 
     assert layer.misses((3.0, 4.0, up_m)) is misses
     assert layer.above((3.0, 4.0, up_m)) == (3.0, 4.0, 17.0)
+
+
+@pytest.mark.parametrize(("up_m", "over"), [(17.0, True), (-1.0, True), (-2.5, False)])
+def test_nobody_is_led_below_all_that_is_visited(script: Script, up_m: float, over: bool) -> None:
+    """It is at 0 m, 2 m less for errors."""
+    agent = apart(script)
+    layer = OwnLayer(agent.core.replica, MissionView("m", "u0", agent.core.replica))
+
+    assert layer.is_over([(0.0, 0.0, 17.0), (3.0, 4.0, up_m)]) is over

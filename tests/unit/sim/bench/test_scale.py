@@ -32,7 +32,21 @@ from sim.fleet import capacity
 from swarm.cli import main
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import MessageReceived, Tick
-from tests.support.builders import TIMING, choice, epoch, held, message, mission, status, task, uav
+from swarm.protocol.messages import Body
+from swarm.protocol.uav_messages import ClaimPhase
+from tests.support.builders import (
+    IDLE,
+    TIMING,
+    choice,
+    done,
+    epoch,
+    held,
+    message,
+    mission,
+    status,
+    task,
+    uav,
+)
 
 SMALL = ScaleRun(
     uavs=2,
@@ -45,12 +59,19 @@ SMALL = ScaleRun(
     published_hz={"status": 5.0, "claim": 0.5, "choice": 0.25},
     received_hz={"claim": 0.5, "epoch": 0.5},
     latency_ms=(1.0, 2.0, 30.0),
+    told_ms=(3.0, 4.0, 50.0),
     lost=0,
     ended=0,
     load=1.0,
 )
 LARGE = replace(
-    SMALL, uavs=200, up_s=None, airborne_s=None, latency_ms=(), received_hz={"claim": 99.5}
+    SMALL,
+    uavs=200,
+    up_s=None,
+    airborne_s=None,
+    latency_ms=(),
+    told_ms=(),
+    received_hz={"claim": 99.5},
 )
 BENCH = ScaleBench(this_machine(), ScaleSettings((2, 200)), (SMALL, LARGE))
 
@@ -77,6 +98,28 @@ def test_messages_of_uavs_and_of_the_coordinator_are_counted_apart() -> None:
     assert heard == {"claim": pytest.approx(0.05), "epoch": pytest.approx(0.1)}
 
 
+def test_a_decision_is_timed_until_an_observer_has_heard_what_is_claimed_next() -> None:
+    count = MessageCount()
+    state = MissionState(mission([uav("u0"), uav("u1")], [task("t0", 1.0)]), TIMING)
+    core = count.around(state, state)
+    core.start(100.0)
+    facts: list[tuple[float, str, Body]] = [
+        (100.0, COORDINATOR, epoch("u0", "u1")),
+        (100.1, "u0", held("t0", 0.0)),
+        (105.01, "u0", done("t0", completed_s=5.0)),
+        (105.02, "u0", held("t0", 0.0)),  # said again, late
+        (105.03, "u0", replace(held("t1", 5.0), phase=ClaimPhase.PROPOSED)),
+        (105.5, "u0", replace(held("t1", 5.0), phase=ClaimPhase.PROPOSED)),
+        (106.0, "u1", done("t2", completed_s=6.0)),
+        (106.01, "u1", replace(IDLE, decided_s=6.0)),
+        (109.0, "u1", replace(held("t3", 9.0), phase=ClaimPhase.PROPOSED)),
+    ]
+    for number, (now_s, writer, body) in enumerate(facts, 1):
+        core.step(MessageReceived(message(writer, body, number)), now_s)
+
+    assert count.claim_delays.told_ms == [pytest.approx(30.0)]
+
+
 def test_decisions_are_timed_by_what_agents_log() -> None:
     count = MessageCount()
     said = {"event": TURNAROUNDS, "target_ms": [1.5, 2.5], "in_force_ms": [], "idled": 0}
@@ -96,6 +139,8 @@ def test_what_follows_from_the_figures_is_told_with_them() -> None:
     assert (first["claims_per_decision"], first["besides_hz"]) == (2.0, 0.5)
     assert (first["latency_p50_ms"], first["latency_p99_ms"]) == (2.0, 30.0)
     assert second["latency_p99_ms"] is None
+    assert (first["told_p50_ms"], first["told_p99_ms"]) == (4.0, 50.0)
+    assert second["told_p99_ms"] is None
     json.dumps(told, allow_nan=False)
 
 
