@@ -4,8 +4,8 @@ The same kind of survey is flown by fleets of several sizes, one after the other
 with the same rate of position reports, each watched for a while in the middle of its mission and
 ended. What processes use is read from the kernel: processor time, and memory as the proportional
 share of pages, since a fleet's processes share what they have imported. What is said is counted by
-an observer on the bus. Decisions are timed by the agents, to the next target, and by that observer,
-to the next claim; with a separation a target may wait for its way. Linux alone tells all of it.
+an observer on the bus. Decisions are timed by the agents, to the next target, where that waits for
+no way, and by that observer, to the next claim. Linux alone tells all of it.
 """
 
 from __future__ import annotations
@@ -87,7 +87,8 @@ class ScaleRun:
     received_hz: Mapping[str, float]
     """By kind, messages that each agent hears."""
     latency_ms: tuple[float, ...]
-    """From each arrival, or end of service, until the next target was sent, its way granted."""
+    """From each arrival, or end of service, until the next target was sent; of UAVs that keep apart
+    nobody times it."""
     told_ms: tuple[float, ...]
     """From each end of service until an observer has heard what the UAV claims next."""
     lost: int
@@ -180,13 +181,6 @@ class ScaleBench(BenchResult):
                 Column("most", ".1f", "MB", 1e-6),
                 Column("agent's CPU", ".2f", "%", 100.0),
                 Column("all CPU", ".0f", "%", 100.0),
-                Column("p50", ".1f", "ms"),
-                Column("p99", ".1f", "ms"),
-                Column("decisions"),
-                Column("told p50", ".1f", "ms"),
-                Column("told p99", ".1f", "ms"),
-                Column("claims each", ".1f", none="-"),
-                Column("heard besides", ".1f", "/s"),
                 Column("nearest", ".1f", "m", none="-"),
                 Column("lost"),
                 Column("load", ".1f"),
@@ -200,13 +194,6 @@ class ScaleBench(BenchResult):
                     max(run.agent_share_bytes, default=0),
                     run.agent_cpu_frac,
                     sum(run.cpu_frac.values()),
-                    run.latency_quantile_ms(0.5),
-                    run.latency_quantile_ms(0.99),
-                    len(run.latency_ms),
-                    quantile(run.told_ms, 0.5),
-                    quantile(run.told_ms, 0.99),
-                    run.claims_per_decision,
-                    run.besides_hz,
                     run.nearest_m,
                     run.lost + run.ended,
                     run.load,
@@ -215,8 +202,29 @@ class ScaleBench(BenchResult):
             ],
             "What fleets take",
         )
+        yield self._decisions()
         yield self._messages("Published by each UAV [1/s]", [run.published_hz for run in self.runs])
         yield self._messages("Heard by each agent [1/s]", [run.received_hz for run in self.runs])
+
+    def _decisions(self) -> ResultTable:
+        columns = (
+            *(Column("UAVs", key="uavs"), Column("decisions")),
+            *(Column("p50", ".1f", "ms"), Column("p99", ".1f", "ms")),
+            *(Column("told p50", ".1f", "ms"), Column("told p99", ".1f", "ms")),
+            Column("claims each", ".1f", none="-"),
+            Column("heard besides", ".1f", "/s"),
+        )
+        rows = [
+            (
+                *(run.uavs, max(len(run.latency_ms), len(run.told_ms))),
+                *(run.latency_quantile_ms(share) for share in (0.5, 0.99)),
+                *(quantile(run.told_ms, share) for share in (0.5, 0.99)),
+                *(run.claims_per_decision, run.besides_hz),
+            )
+            for run in self.runs
+        ]
+        title = "Decisions: from the end of a service to the next target, and until they are told"
+        return ResultTable(columns, rows, title)
 
     def _messages(self, title: str, of: Sequence[Mapping[str, float]]) -> ResultTable:
         """By kind, side by side, and the sum over that of the first fleet."""
