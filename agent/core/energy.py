@@ -23,6 +23,8 @@ finely it is told."""
 _SPAN_FRAC: Final = 0.04
 _SPAN_S: Final = 20.0
 """A drain is measured over no less of the charge, and no less time: words come some time late."""
+_SHORT_SPAN_FRAC: Final = 0.08
+"""A shorter time tells something if so much is used in it: less may be a voltage that sags."""
 _LATE_S: Final = 2.0
 """So much later than others a word of the charge may come [s]."""
 _RISE_FRAC: Final = 0.005
@@ -138,7 +140,8 @@ class DrainGauge:
         if used_frac < _SPAN_FRAC - 1e-9:
             return None
         if flown_s < _SPAN_S:
-            self.least_1_s = used_frac / (flown_s + _LATE_S)
+            if used_frac >= _SHORT_SPAN_FRAC - 1e-9:
+                self.least_1_s = used_frac / (flown_s + _LATE_S)
             return None
         self._since, self.least_1_s = (now_s, battery_frac), None
         return used_frac / flown_s

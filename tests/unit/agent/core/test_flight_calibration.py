@@ -180,9 +180,9 @@ def test_a_drain_is_measured_whatever_the_steps_in_which_charge_is_told(
 
 def test_a_fast_drain_is_known_in_part_before_a_span_is_long_enough() -> None:
     gauge = DrainGauge()
-    for at_s, frac in ((0.0, 0.9), (1.0, 0.88), (2.0, 0.86)):
+    for at_s, frac in ((0.0, 0.9), (1.0, 0.88), (4.0, 0.82)):
         gauge.read(frac, at_s)
-    assert gauge.least_1_s is None  # 2 % in a second
+    assert gauge.least_1_s is None  # 6 % may be a voltage that sags in a climb
 
     assert gauge.read(0.68, 11.0) is None
     assert gauge.least_1_s == pytest.approx(0.2 / 12.0)
