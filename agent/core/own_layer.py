@@ -28,7 +28,7 @@ class OwnLayer:
         self._mission_view = mission_view
         self._heights_of: object = None
         """Brief and tasks of which the heights are."""
-        self._heights_m = 0.0, 0.0
+        self._heights_m = 0.0, 0.0, 0.0
 
     def above(self, place_enu_m: Point) -> Point:
         """Above that place or below it, in the own layer [m]."""
@@ -51,24 +51,29 @@ class OwnLayer:
         me, brief = self._mission_view.me, self._replica.brief
         if me is None or brief is None or brief.terrain is not None:
             return False
-        low_m, high_m = self._visited_m(brief)
+        low_m, high_m, _ = self._visited_m(brief)
         return not low_m - _SLACK_M <= place_enu_m[2] - me.layer_m <= high_m + _SLACK_M
 
     def is_over(self, path_enu_m: Iterable[Point]) -> bool:
-        """Whether no corner of a way is lower than all that is visited [m]; over hills likewise."""
+        """Whether no corner of a way is lower than all that is visited [m]; over hills likewise.
+
+        Tasks that ask for a height of their own may ask for one below the ground of all others.
+        """
         brief = self._replica.brief
         if brief is None or brief.terrain is not None:
             return True
-        low_m, _ = self._visited_m(brief)
-        return all(up_m >= low_m - _SLACK_M for *_, up_m in path_enu_m)
+        least_m = self._visited_m(brief)[2]
+        return all(up_m >= least_m - _SLACK_M for *_, up_m in path_enu_m)
 
-    def _visited_m(self, brief: MissionConfig) -> tuple[float, float]:
-        """The lowest and the highest place on the ground [m; without layers]."""
+    def _visited_m(self, brief: MissionConfig) -> tuple[float, float, float]:
+        """The lowest and the highest place without layers, and the lowest that is flown to [m]."""
         known = brief, self._replica.board_version
         if self._heights_of != known:
             up_m = [uav.position_enu_m[2] for uav in brief.uavs]
             up_m += [base.position_enu_m[2] for base in brief.bases]
             for task in self._replica.board.values():
                 up_m += [place[2] for place in (task.position_enu_m, *task.path_enu_m)]
-            self._heights_of, self._heights_m = known, (min(up_m), max(up_m))
+            own_m = [task.height_m for task in self._replica.board.values()]
+            least_m = min([*up_m, *(height_m for height_m in own_m if height_m is not None)])
+            self._heights_of, self._heights_m = known, (min(up_m), max(up_m), least_m)
         return self._heights_m

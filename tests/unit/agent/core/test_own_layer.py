@@ -115,3 +115,11 @@ def test_nobody_is_led_below_all_that_is_visited(script: Script, up_m: float, ov
     layer = OwnLayer(agent.core.replica, MissionView("m", "u0", agent.core.replica))
 
     assert layer.is_over([(0.0, 0.0, 17.0), (3.0, 4.0, up_m)]) is over
+
+
+def test_a_task_that_asks_for_a_height_below_the_origin_is_flown_there(script: Script) -> None:
+    """In a quarry, say, on whose rim the fleet starts; its place on the map has no height."""
+    agent = apart(script, height_m=-20.0)
+
+    assert agent.flight.task == "t0"
+    assert agent.flight.position_enu_m == (20.0, 0.0, -20.0)
