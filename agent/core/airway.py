@@ -448,9 +448,9 @@ class Airway:
         if air.is_granted(self._uav, self._claims(), self._fleet.expired()):
             if way.path_enu_m:
                 self._vehicle.set_off(way.path_enu_m[0], from_ground=not self._aloft)
-            self._depart(wish)
             if now_s > wish.since_s and wish is not self._aside:
                 self.when_departed()
+            self._depart(wish)
             if wish is not self._aside:
                 self._wish = None
             elif self._wish is not None:

@@ -146,6 +146,8 @@ class FieldTasking(Tasking):
                 self._visit_base(haven, now_s)
             self._depart_if_due(now_s)
             self._begin_if_due(now_s)
+            if self._airway.waits_on_ground:  # nothing of its battery is used up yet
+                self._depart_late()
             if self._drained:
                 self._drain(now_s)
             self._give_up_what_is_late(now_s)

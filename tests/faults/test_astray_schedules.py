@@ -28,6 +28,7 @@ BROKEN_ONCE = {
     9002971: "an agent begun anew while its vehicle landed at home stopped it there, on the ground",
     9003249: "who flew to its base stopped for a zone that was taken away",
     9004022: "who lost its task right after take-off was stopped where it had stood, underground",
+    9700274: "a sortie was counted from when it asked for its way up if that became a longer one",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

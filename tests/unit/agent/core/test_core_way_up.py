@@ -8,15 +8,16 @@ from agent.core.fleet_air import STOP_LEG
 from agent.core.interface import Arrived, GoTo, Hold, Return, Swap
 from agent.core.states import AgentState
 from swarm.protocol.fields import Point
-from swarm.protocol.messages import CommandKind
+from swarm.protocol.messages import CommandKind, TaskEntry
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimedWay, ClaimPhase
 from tests.support.builders import entry
-from tests.support.field_agent import BASE, FAR_BASE, FieldAgent, Script, square
+from tests.support.field_agent import BASE, BUDGET_S, FAR_BASE, FieldAgent, Script, square
 from tests.support.lone_agent import orders
 
 BAND_M = 8.0, 12.0
 FAR_AWAY = (-900.0, 0.0, 10.0)
 ABOVE, ON_GROUND = (50.0, 0.0, 10.0), (50.0, 0.0, 0.0)
+BEHIND = entry("t0", 100.0)
 NEXT_BASE = replace(FAR_BASE, id="b1", position_enu_m=(50.0, 30.0, 0.0))
 
 
@@ -26,10 +27,16 @@ class WaitingOnGround:
     Unless that one hovers elsewhere then.
     """
 
-    def __init__(self, script: Script, next_item: str, then_enu_m: Point = ABOVE) -> None:
+    def __init__(
+        self,
+        script: Script,
+        next_item: str,
+        then_enu_m: Point = ABOVE,
+        task: TaskEntry = BEHIND,
+    ) -> None:
         self.agent = agent = FieldAgent("u1", bases=[BASE, NEXT_BASE])
         agent.brief = replace(agent.brief, separation_m=5.0, band_m=BAND_M)
-        agent.fly_to(entry("t0", 100.0), entry("t1", 0.0))
+        agent.fly_to(task, entry("t1", 0.0))
         self.other_is(FAR_AWAY)
         agent.be_at((0.0, 0.0, 10.0), None)
         script.items = ["base:b0"]
@@ -160,3 +167,33 @@ def test_who_loses_its_task_right_after_it_was_sent_off_stops_above_its_base(
 
     assert waiting.flights()[-1].position_enu_m[:2] == (50.0, 0.0)
     assert all(in_band(flight) for flight in waiting.flights())
+
+
+def test_a_sortie_begins_when_the_vehicle_leaves_the_ground_though_by_a_longer_way(
+    script: Script,
+) -> None:
+    waiting = WaitingOnGround(script, "t0")
+    agent = waiting.agent
+
+    agent.run_until(74.0)
+    waiting.other_is(FAR_AWAY)
+
+    (flight,) = waiting.flights()
+    assert flight.via_enu_m == ((50.0, 0.0, 8.0),)  # it has asked for another layer
+    assert agent.claim is not None
+    assert agent.claim.sortie_end_s == 74.0 + BUDGET_S
+
+
+def test_who_waits_on_the_ground_uses_nothing_of_its_battery_up(script: Script) -> None:
+    """Its battery would be too short by now if it had taken off when it asked for its way."""
+    near = entry("t0", 52.0, service_s=BUDGET_S - 2.0 * 2.0 - 3.0)
+    waiting = WaitingOnGround(script, "t0", task=near)
+    agent = waiting.agent
+
+    agent.run_until(77.0)
+    assert (agent.task, waiting.flights()) == ("t0", [])
+    waiting.other_is(FAR_AWAY)
+
+    assert [flight.task for flight in waiting.flights()] == ["t0"]
+    assert agent.claim is not None
+    assert agent.claim.sortie_end_s == 77.0 + BUDGET_S
