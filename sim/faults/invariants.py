@@ -14,9 +14,10 @@ Beside the invariants of the messages (sim.faults.message_log):
   operator's last word to its UAV was to hold or to come home;
 - *task lost*: in the end each task that was posted, or added by the operator, is done, failed,
   withdrawn, or open with no UAV able to do it that knew of it before it left, and of a mission
-  that had begun, and came home of its own accord; or the operator added it too late, when the
-  coordinator ended the mission. Who found no way there, or home, while somebody was lost or not
-  heard (`sim.faults.shut_air`), or whose battery was used up in a hold, was not able to do it;
+  that had begun, and came home of its own accord; or the operator added it, or took the zone
+  over it away, too late, when the coordinator ended the mission. Who found no way there, or home,
+  while somebody was lost or not heard (`sim.faults.shut_air`), or whose battery was used up in a
+  hold, was not able to do it;
 - *not home*: in the end every living agent has come home, as long as anybody knows of a mission;
 - *too near*: no two UAVs in the air are nearer to each other than the mission's separation, less
   how far one of them may be from where it believes to be;
@@ -102,6 +103,8 @@ class InvariantChecker:
         """By UAV that takes no further part: the tasks it knew of that were on the board."""
         self._known_at_the_end: dict[str, set[str]] = {}
         """By coordinator's process: tasks that it knew of when it first said the mission over."""
+        self._zones_at_the_end: set[str] = set()
+        """Zones that one of them took to be in force then."""
         self._shared_since_s: dict[tuple[Process, Process, str], float] = {}
 
     @property
@@ -143,7 +146,9 @@ class InvariantChecker:
             case PlanEpoch(phase=MissionPhase.ENDED) if isinstance(
                 core, CoordinatorCore | StandbyCore
             ):
-                self._known_at_the_end.setdefault(process.name, _on_board(core.replica))
+                if process.name not in self._known_at_the_end:
+                    self._known_at_the_end[process.name] = _on_board(core.replica)
+                    self._zones_at_the_end |= {z.id for z in zones_in_force(core.replica)}
             case _:
                 pass
 
@@ -381,6 +386,7 @@ class InvariantChecker:
     def _drawn_over(self, uav: str, at_s: float) -> Iterator[Zone]:
         """Zones drawn in flight that may have kept ``uav`` from what it left undone then."""
         last = {zone.id for zone in zones_in_force(self._world.agents[uav].replica)}
+        last |= self._zones_at_the_end
         for drawn in self._injector.drawn:
             if drawn.since_s <= at_s <= drawn.until_s + SETTLED_S or drawn.zone.id in last:
                 yield drawn.zone

@@ -9,6 +9,7 @@ proves nothing. Each process judges for itself.
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Iterable
 
 from swarm.model.ids import COORDINATOR
@@ -26,10 +27,11 @@ class Membership:
         """Who has ever said something, here or elsewhere; silence means nothing of others."""
         self._gone_until_s: dict[str, float] = {}
         """Present writers without a token, and when each is lost unless it is seen again."""
-        self._silent_at_s: dict[str, float] = {}
+        self._silent_at_s: OrderedDict[str, float] = OrderedDict()
         """Present writers that have been heard, and when each is lost unless it speaks again.
 
-        UAVs have equally long from when they were last heard, so they are in order of time."""
+        UAVs have equally long from when they were last heard, so they are in order of time. In a
+        plain `dict` the first one is behind the gaps of all that have been moved to the end."""
         self._mute: set[str] = set()
         """Lost by silence, with a living token."""
         self._interrupted: set[str] = set()
@@ -177,14 +179,15 @@ class Membership:
 
     def _wait_for(self, writer: str, now_s: float) -> None:
         """``writer`` shall speak again: of all it has the longest until then."""
-        self._silent_at_s.pop(writer, None)
         self._silent_at_s[writer] = now_s + self._patience_s(writer)
+        self._silent_at_s.move_to_end(writer)
 
     def _grant_grace(self, now_s: float) -> None:
         """Everyone gets the time to show its token, and to speak, that it would need anew."""
         gone_s = now_s + self._timing.relink_grace_s
         self._gone_until_s = dict.fromkeys(self._gone_until_s, gone_s)
-        self._silent_at_s = {w: now_s + self._patience_s(w) for w in self._silent_at_s}
+        for writer in self._silent_at_s:
+            self._silent_at_s[writer] = now_s + self._patience_s(writer)
 
     def _patience_s(self, writer: str) -> float:
         """How long ``writer`` may be silent; the coordinator speaks as often in every fleet."""

@@ -29,6 +29,7 @@ BROKEN_ONCE = {
     9003249: "who flew to its base stopped for a zone that was taken away",
     9004022: "who lost its task right after take-off was stopped where it had stood, underground",
     9700274: "a sortie was counted from when it asked for its way up if that became a longer one",
+    11001244: "the judge took a zone for gone of which the coordinator had not heard that it is",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 
