@@ -207,6 +207,7 @@ class RecordingRule:
     def __init__(self, rule: Rule, uav: int) -> None:
         self.name = rule.name
         self._rule = rule
+        self._idling = rule if isinstance(rule, IdlingRule) else None
         self._uav = uav
         self._state: TeamState | None = None
 
@@ -222,9 +223,8 @@ class RecordingRule:
         self, problem: Problem, state: TeamState, rank: IntArray, uavs: Sequence[int]
     ) -> int:
         """Whatever the rule says, where it says anything."""
-        if not isinstance(self._rule, IdlingRule):
-            return 0
-        return self._rule.count_idle(problem, state, rank, uavs)
+        idling = self._idling
+        return 0 if idling is None else idling.count_idle(problem, state, rank, uavs)
 
     def valued(self, problem: Problem, decision: Decision) -> tuple[tuple[int, float], ...]:
         """Tasks that ``decision`` chose from, with their scores: what it took, then best first."""

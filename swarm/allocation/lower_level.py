@@ -198,18 +198,23 @@ def decisions(
     ]
     heapify(queue)
     idling = rule if isinstance(rule, IdlingRule) else None
+    turns: list[int] = []
     while queue:
-        if idling is not None and (turns := _before(last, queue)):
-            for _ in range(idling.count_idle(problem, state, rank, turns)):
+        if idling is not None and (turns := turns or _before(last, queue)):
+            idle = idling.count_idle(problem, state, rank, turns)
+            for _ in range(idle):
                 heappop(queue)
             if not queue:
                 return
-        _, place, uav = heappop(queue)
+            turns = turns[idle + 1 :]
+        now_s, place, uav = heappop(queue)
         decision = rule.decide(problem, state, rank, uav)
         if decision is not None:
             state.apply(problem, decision)
             if isfinite(decision.completion_s):
                 heappush(queue, (decision.completion_s, place, uav))
+            if decision.completion_s == now_s:  # it has a turn again before the others
+                turns = []
             yield decision
         # Who takes none has no further decision, as tasks only close.
         if uav == last:
