@@ -20,7 +20,7 @@ from agent.core.attention import Attention
 from agent.core.context import AgentContext, AgentPart, usual_field_rule
 from agent.core.field_tasking import FieldTasking
 from agent.core.ground_station import HELD_BEFORE, GroundStation, was_held
-from agent.core.interface import Action, Event, OrderVehicle, Telemetry
+from agent.core.interface import Action, Event, Telemetry
 from agent.core.memory import RecoveredState, SaveCondition
 from agent.core.mission_view import MissionView, Peers
 from agent.core.near_traffic import NearTraffic
@@ -34,6 +34,7 @@ from agent.core.states import (
     Trigger,
 )
 from agent.core.station_words import StationAsked
+from agent.core.step_actions import arranged
 from agent.core.stop_conditions import BusLossTimer, EndCondition, OperatorCommands
 from agent.core.told_zones import ToldZones
 from agent.core.vehicle_commander import VehicleCommander
@@ -48,7 +49,6 @@ from swarm.protocol.events import (
     MessagesReceived,
     PeerGone,
     PeerSeen,
-    PublishLast,
     Save,
     SnapshotsReceived,
     Stop,
@@ -482,19 +482,6 @@ class AgentCore(AgentPart):
         remembers = self.state not in (AgentState.SYNCING, AgentState.YIELDED)
         if remembers and self._saving.worth_keeping(actions, now_s, begun=self._commander.begun):
             actions.insert(0, Save())
-        # The vehicle first: it waits, while keeping and telling take their time.
-        if len(actions) > 1:
-            actions.sort(key=_place)
         self._deadline_s = self._earliest_deadline_s()
         self._stall_detector.expect_by(self._deadline_s)
-        return actions
-
-
-def _place(action: Action) -> int:
-    match action:
-        case OrderVehicle():
-            return 0
-        case PublishLast():
-            return 2
-        case _:
-            return 1
+        return arranged(actions)

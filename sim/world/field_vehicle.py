@@ -89,6 +89,8 @@ class FieldVehicle(TracedVehicle):
         self._start_enu_m = self._uav.position_enu_m
         self._path: FlownPath | None = None
         self._leaves_s = 0.0
+        self._flown_for: str | None = None
+        """The task to which that path leads."""
         self._place_enu_m: Point | None = None
         """Where it stands or hovers, if it flies nowhere; None before its first lift-off."""
         self._layers_m = 0.0, 0.0
@@ -116,7 +118,8 @@ class FieldVehicle(TracedVehicle):
             self._refuse(order, "there is no base")
             return
         self._orders += 1
-        self._rest(now_s)
+        if not self._keeps_on(order, now_s):
+            self._rest(now_s)
         match order:
             case Prepare():
                 self._prepare(order, ready, now_s)
@@ -217,11 +220,7 @@ class FieldVehicle(TracedVehicle):
         """Fly and land where it is told to, else where it was launched; at once on the ground."""
         arrives_s = now_s
         if self._flies and self._place_enu_m is not None:
-            corners = [*order.path_enu_m, *([] if order.via_enu_m is None else [order.via_enu_m])]
-            if not order.land:
-                east_m, north_m, up_m = self._start_enu_m
-                corners.append((east_m, north_m, up_m + self._layer_m))
-            stop = corners.pop() if corners else self._place_enu_m
+            *corners, stop = self._corners_of(order) or [self._place_enu_m]
             arrives_s = self._fly(tuple(corners), stop, None, now_s)
         self._unless_told(arrives_s, self._be_home)
 
@@ -243,10 +242,30 @@ class FieldVehicle(TracedVehicle):
 
     # -- motion -------------------------------------------------------------------------
 
+    def _corners_of(self, order: GoTo | Return) -> tuple[Point, ...]:
+        """Where it is told to fly [m]; nowhere if it is to land where it is."""
+        if isinstance(order, GoTo):
+            return *order.via_enu_m, order.position_enu_m
+        corners = (*order.path_enu_m, *(() if order.via_enu_m is None else (order.via_enu_m,)))
+        if order.land:
+            return corners
+        east_m, north_m, up_m = self._start_enu_m
+        return *corners, (east_m, north_m, up_m + self._layer_m)
+
+    def _keeps_on(self, order: VehicleOrder, now_s: float) -> bool:
+        """Whether it is told to fly what is left of its way: it does not stop for that."""
+        path = self._path
+        if path is None or not isinstance(order, GoTo | Return):
+            return False
+        same = (order.task if isinstance(order, GoTo) else None) == self._flown_for
+        return same and path.corners_ahead_enu_m(now_s - self._leaves_s) == self._corners_of(order)
+
     def _fly(
         self, via_enu_m: tuple[Point, ...], stop_enu_m: Point, name: str | None, now_s: float
     ) -> float:
         """Leave for a place along corners, from the ground straight up first; when it arrives."""
+        if self._path is not None:  # it is on that way already
+            return self._leaves_s + self._path.duration_s
         if not self._flies:
             self._climb(now_s)
         here = self._place_enu_m or stop_enu_m
@@ -254,7 +273,7 @@ class FieldVehicle(TracedVehicle):
         if name is None and not via_enu_m and self._is_just_past(stop_enu_m):
             ends_m = ends_m[0], ends_m[0]  # it stays where it is, which need not be in its layer
         path = self._paths.path(self._uav.id, (here, *via_enu_m, stop_enu_m), ends_m)
-        self._layers_m, self._leaves_s = ends_m, now_s
+        self._layers_m, self._leaves_s, self._flown_for = ends_m, now_s, name
         self._becomes_m = self._stops_astray_m(name, path)
         pace = self.speed_frac * self._true_pace(name, path)
         self._path = path = path.lasting(path.duration_s / pace)

@@ -99,6 +99,11 @@ class FlownPath:
         begin, end = self.corners_enu_m[number : number + 2]
         return between(begin, end, (share - first) / (last - first))
 
+    def corners_ahead_enu_m(self, at_s: float) -> tuple[Point, ...]:
+        """What is left of the corners after a time [m], the end included; none from the end on."""
+        share = self.share(at_s)
+        return () if share >= 1.0 else self.corners_enu_m[self._piece_at(share) + 1 :]
+
     def velocity_enu_m_s(self, at_s: float) -> Point:
         """Velocity after a time [m/s]; zero before the start and from the end on."""
         if not 0.0 <= at_s < self.duration_s:

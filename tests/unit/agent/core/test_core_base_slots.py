@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from agent.core.interface import Home, Swap
+from agent.core.interface import GoTo, Home, Swap
 from agent.core.states import AgentState
 from swarm.protocol.uav_messages import BaseStage, ClaimPhase, StatusPhase
 from tests.support.base_visitor import NEAR_BASE, beside_slots, on_its_way
@@ -20,6 +20,7 @@ from tests.support.field_agent import (
     Script,
     visiting,
 )
+from tests.support.lone_agent import orders
 
 
 def test_it_waits_above_a_base_whose_slot_is_held_and_lands_when_that_is_left(
@@ -293,3 +294,19 @@ def test_on_its_way_to_stand_beside_blocked_slots_it_takes_one_that_is_cleared(
     agent.arrive(BUDGET_S - 1.0)
 
     assert (agent.state(), agent.stage) == (AgentState.SWAPPING, BaseStage.LANDED)
+
+
+def test_on_its_way_to_slots_that_become_blocked_it_flies_on_without_a_stop(script: Script) -> None:
+    """Its battery lasts for nothing else: one step gives the base up, and goes on to it."""
+    agent = on_its_way(script, "u1")
+    agent.hear("u1", visiting(BaseStage.LANDED, 5.0))
+    script.items = []
+    agent.be_at((58.0, 0.0, 10.0), None, BUDGET_S - 8.5)
+    told = len(orders(agent.log))
+
+    agent.lose("u1", BUDGET_S - 8.0)
+
+    assert agent.state() is AgentState.FLYING_TO_BASE
+    (flight,) = orders(agent.log)[told:]
+    assert isinstance(flight, GoTo)
+    assert flight.position_enu_m == (50.0, 0.0, 10.0)

@@ -155,6 +155,40 @@ def test_with_an_acceleration_the_whole_path_is_flown_from_rest_to_rest() -> Non
     assert flight.told(Arrived(1)) == pytest.approx(70.0 / 10.0 + 10.0 / 2.0)
 
 
+RETURN = Return(
+    "it is over", path_enu_m=(above(30.0, 40.0),), via_enu_m=above(0.0, 40.0), land=True
+)
+
+
+@pytest.mark.parametrize(
+    ("again", "arrives_s"),
+    [
+        pytest.param(GoTo(2, above(0.0, 40.0), via_enu_m=(above(30.0, 40.0),)), 15.0, id="there"),
+        pytest.param(RETURN, 15.0, id="home that way"),
+        pytest.param(GoTo(2, above(30.0, 40.0)), 8.0 + 2.0 * 7.5**0.5, id="not as far"),
+        pytest.param(
+            replace(RETURN, path_enu_m=()),
+            8.0 + 2.0 * (math.hypot(30.0, 15.0) / 2.0) ** 0.5,
+            id="home another way",
+        ),
+    ],
+)
+def test_who_is_told_to_fly_what_is_left_of_its_way_does_not_stop_for_that(
+    again: GoTo | Return, arrives_s: float
+) -> None:
+    """As autopilots do; to fly elsewhere begins at rest."""
+    flight = Flight(replace(MISSION, uavs=(replace(UAV, acceleration_m_s2=2.0),)))
+    corners = above(30.0), above(30.0, 40.0), above(0.0, 40.0)
+    flight.order(GoTo(1, corners[-1], via_enu_m=corners[:-1]))
+    flight.at(8.0, again)  # 25 m behind the first corner, at 10 m/s
+    flight.queue.run(60.0)
+
+    assert flight.told(Home() if isinstance(again, Return) else Arrived(2)) == pytest.approx(
+        arrives_s
+    )
+    assert Arrived(1) not in [report for _, report in flight.reports]
+
+
 def test_position_and_track_agree_at_every_instant() -> None:
     flight = Flight(replace(MISSION, uavs=(replace(UAV, acceleration_m_s2=2.0),)))
     flight.order(GoTo(1, above(30.0, 40.0), via_enu_m=(above(30.0), above(30.0, 20.0))))
