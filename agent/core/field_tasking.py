@@ -480,9 +480,8 @@ class FieldTasking(Tasking):
             return "its battery is used up, and the slots of its base are blocked"
         if self._machine.state in PAUSED_BY_OPERATOR:  # nothing else looks at the time there
             self._home_at_s = self._leaves_at_s(now_s)
-        if self._home_at_s is None or self._home_at_s > now_s:
-            return None
-        return "its battery is about to be used up"
+        due = self._home_at_s is not None and self._home_at_s <= now_s
+        return "its battery is about to be used up" if due or self._limits.is_used_up else None
 
     # -- pieces ----------------------------------------------------------------------------------
 

@@ -19,6 +19,8 @@ from swarm.protocol.uav_messages import Claim
 
 WITHOUT_AIM: Final = PAUSED_BY_OPERATOR | {AgentState.IDLE}
 """In the air, it stands by nothing there: its way home is all that its battery is for."""
+_AMPLE_FRAC: Final = 0.5
+"""With more charge than that above its reserve, it need not look how far its home is."""
 
 
 class TimeLimits(AgentPart):
@@ -102,6 +104,25 @@ class TimeLimits(AgentPart):
         if state not in WITHOUT_AIM:
             return None
         return None if home is None else end_at_s - home.duration_s - self._timing.patience_s
+
+    @property
+    def is_used_up(self) -> bool:
+        """Whether, while no mission runs, its charge is down to its reserve and its way home.
+
+        No time is counted then: a coordinator may have died before everybody was in the air, or
+        the word that the mission runs be lost.
+        """
+        me, told = self._mission_view.me, self._mission_view.telemetry
+        if self._mission_view.running or self._machine.state not in WITHOUT_AIM:
+            return False
+        if me is None or me.endurance_s is None or told is None or told.battery_frac is None:
+            return False
+        left_frac = told.battery_frac - me.reserve_frac
+        if left_frac > _AMPLE_FRAC:
+            return False
+        home = self._flights.way_home()
+        home_s = self._timing.patience_s + (0.0 if home is None else home.duration_s)
+        return left_frac * me.endurance_s <= home_s * self._flights.meter.cautious_drain_frac
 
     def _home_s(self, task: TaskEntry, claim: Claim) -> float:
         """From where the task ends [s]."""

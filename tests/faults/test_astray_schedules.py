@@ -30,6 +30,8 @@ BROKEN_ONCE = {
     9004022: "who lost its task right after take-off was stopped where it had stood, underground",
     9700274: "a sortie was counted from when it asked for its way up if that became a longer one",
     11001244: "the judge took a zone for gone of which the coordinator had not heard that it is",
+    11004872: "who hovered above its start for a mission that never began looked at no charge",
+    11005429: "who was told on its way home that it is to fly home began that way anew, at rest",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import pytest
 
 from agent.core.flights import Flights
-from agent.core.interface import Arrived, GoTo, NotReady, Refused, Return
+from agent.core.interface import Arrived, GoTo, Hold, NotReady, Refused, Return
 from agent.core.states import AgentState
 from swarm.model.ids import FLEET, OPERATOR
 from swarm.protocol.field_messages import BaseSpec
@@ -272,6 +272,35 @@ def test_a_battery_that_drains_faster_ends_the_sortie_earlier(script: Script) ->
     assert script.turns[-1].sortie_end_s == pytest.approx(10.0 + 0.7 * ENDURANCE_S)
     agent.be_at((0.0, 0.0, 10.0), 0.999 * (400.0 - 20.0) / 500.0 + 0.2, 20.0)
     assert script.turns[-1].sortie_end_s <= BUDGET_S
+
+
+def test_who_waits_in_the_air_for_the_mission_to_begin_comes_home_on_what_is_left() -> None:
+    """Nobody counts the time before that: its coordinator may be dead."""
+    agent = FieldAgent(bases=[BASE])
+    agent.fly_to(entry("t0", 100.0))
+    just_enough_frac = 0.2 + (agent.timing.patience_s + 10.0) / ENDURANCE_S
+
+    agent.be_at((10.0, 0.0, 10.0), just_enough_frac + 0.01)
+    agent.tick_when_due()
+    assert agent.phase is ClaimPhase.IDLE
+    agent.be_at((10.0, 0.0, 10.0), just_enough_frac - 0.01)
+    agent.tick_when_due()
+
+    assert agent.phase is ClaimPhase.OUT
+    assert agent.way_home.reason == "its battery is about to be used up"
+
+
+def test_who_is_held_when_the_mission_ends_comes_home_on_what_is_left(script: Script) -> None:
+    agent = flying(script)
+    agent.told(CommandKind.HOLD, 10.0)
+    agent.hear("coordinator", epoch("u0", phase=MissionPhase.ENDED, reason="over", number=2), 20.0)
+    agent.be_at((10.0, 0.0, 10.0), 0.25, 30.0)
+    agent.run_until(35.0)
+    assert isinstance(agent.last_order, Hold)
+
+    agent.be_at((10.0, 0.0, 10.0), 0.21, 40.0)
+    agent.run_until(45.0)
+    assert agent.way_home.reason == "its battery is about to be used up"
 
 
 def test_a_task_that_the_battery_does_not_last_for_is_given_up(script: Script) -> None:
