@@ -187,10 +187,17 @@ class FlightMeter(AgentPart):
         self.sortie.heed(self.rates.drain_frac, self._mission_view.mission_s(now_s))
 
     def land(self) -> None:
-        """It is on the ground, or about to land."""
+        """It is on the ground, or about to land.
+
+        Of a flight too short to measure a drain, what it was at least is all that is learned: who
+        turns back for that must know when it decides anew.
+        """
+        now_s, least_frac = self._mission_view.now_s, self._least_drain_frac
         self._departure, self._at_rest = None, False
         self._gauge.begin()
         self._least_drain_frac = 0.0
+        if self._counts and least_frac > self.rates.drain_frac * (1.0 + STEP_FRAC):
+            self._vote(self._medians.drains, least_frac, DRAIN_FRAC_RANGE, now_s)
         self._stands, self._lands_since_s = False, None
 
     def come_down(self, now_s: float) -> None:

@@ -265,13 +265,25 @@ class FleetAir:
     def begin_at(self, wish: Wish, place_enu_m: Point) -> None:
         """The UAV, which has made room, waits there for its way [m; in its own layer].
 
-        Round the same corners if nothing is between it and the first of them, else it goes back.
+        Round the same corners if nothing is between it and the first of them. Else, and where its
+        way is work from there on, it goes back.
         """
         here, *rest = wish.corners_enu_m
         if math.dist(here[:2], place_enu_m[:2]) < _BESIDE_M:
             return
-        back = wish.fixed or not rest or not self._is_clear(place_enu_m, rest[0])
+        back = wish.fixed or not rest or self._is_along_line(wish)
+        back = back or not self._is_clear(place_enu_m, rest[0])
         wish.corners_enu_m = (place_enu_m, *([here] if back else []), *rest)
+
+    def _is_along_line(self, wish: Wish) -> bool:
+        """Whether it leads along its task, from one end to the other."""
+        task = self._replica.board.get(wish.task or "")
+        line = () if task is None else task.path_enu_m
+        begins, stops = wish.corners_enu_m[0], wish.corners_enu_m[-1]
+        return any(
+            math.dist(begins[:2], one[:2]) < _SPOT_M and math.dist(stops[:2], other[:2]) < _BESIDE_M
+            for one, *_, other in ((line, line[::-1]) if line else ())
+        )
 
     def _is_clear(self, begin_enu_m: Point, end_enu_m: Point) -> bool:
         """Whether no zone is between the two, at whatever height."""

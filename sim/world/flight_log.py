@@ -11,6 +11,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from agent.core.fleet_air import STOP_LEG
 from agent.core.interface import (
     Arrived,
     GoTo,
@@ -229,6 +230,8 @@ class FlightLog:
 
     def _go(self, uav: str, flown: _Flown, order: GoTo, place_enu_m: Point, now_s: float) -> None:
         leg, here = flown.open, place_enu_m[:2]
+        if order.leg == STOP_LEG and leg is not None and self._waits_to_begin(leg):
+            return  # it only makes room meanwhile
         way = [corner[:2] for corner in (*order.via_enu_m, order.position_enu_m)]
         again = leg is not None and (leg.task, leg.attempt) == (order.task, order.attempt)
         if leg is None or not again or (order.task is None and leg.via_m[-1] != way[-1]):
@@ -248,6 +251,12 @@ class FlightLog:
             return
         leg.via_m = [*self._passed_m(uav, leg.depart_s, now_s), here, *way]
         leg.arrive_s = None
+
+    def _waits_to_begin(self, leg: _OpenLeg) -> bool:
+        """Whether it is at an end of its line, along which it has not been sent yet."""
+        task = self._tasks.get(leg.task or "")
+        is_line = task is not None and bool(task.path_enu_m)
+        return is_line and leg.arrive_s is not None and leg.begin_s is None
 
     def _return(
         self, uav: str, flown: _Flown, order: Return, place_enu_m: Point, now_s: float

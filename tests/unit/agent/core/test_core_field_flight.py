@@ -282,7 +282,7 @@ def test_who_waits_in_the_air_for_the_mission_to_begin_comes_home_on_what_is_lef
 
     agent.be_at((10.0, 0.0, 10.0), just_enough_frac + 0.01)
     agent.tick_when_due()
-    assert agent.phase is ClaimPhase.IDLE
+    assert agent.state() is AgentState.IDLE
     agent.be_at((10.0, 0.0, 10.0), just_enough_frac - 0.01)
     agent.tick_when_due()
 

@@ -10,7 +10,7 @@ from tests.support.builders import IDLE, message
 FIRST, SECOND = (OrderVehicle(GoTo(leg, (10.0 * leg, 0.0, 10.0))) for leg in (1, 2))
 HOLD, ASIDE = OrderVehicle(Hold("wait")), OrderVehicle(GiveWay(stands=True))
 NOTE = LogLine("released", {})
-SAID, LAST = Publish(message("u0", IDLE)), PublishLast(message("u0", IDLE))
+SAID, LAST = Publish(message("u0", IDLE)), PublishLast(lambda: message("u0", IDLE))
 
 
 def test_the_vehicle_comes_first_and_last_words_last() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from agent.core.fleet_air import STOP_LEG
 from agent.core.interface import Arrived, GoTo, Telemetry
 from sim.world.flight_log import FlightLog
 from swarm.model import Mission, Origin, Task, TaskId, Uav, UavId
@@ -56,6 +57,23 @@ def test_who_waits_at_one_end_and_takes_the_line_from_the_other_begins_it_there(
     (entry,) = log.executed_schedule(0.0)[UavId("u0")]
     assert (entry.begin_s, entry.end_s) == (30.0, 50.0)
     assert entry.is_reversed
+
+
+def test_who_makes_room_before_it_may_fly_along_its_line_begins_that_when_it_does() -> None:
+    log, beside = FlightLog(MISSION, {}), (LINE[0][0], LINE[0][1] + 20.0, LINE[0][2])
+
+    log.ordered("u0", GoTo(1, LINE[0], task="line"), at((0.0, 0.0, 0.0)), 0.0)
+    log.reported("u0", Arrived(1), 10.0)
+    log.ordered("u0", GoTo(STOP_LEG, beside), at(LINE[0]), 12.0)
+    log.reported("u0", Arrived(STOP_LEG), 14.0)
+    along = GoTo(2, LINE[2], task="line", via_enu_m=(LINE[0], LINE[1]))
+    log.ordered("u0", along, at(beside), 30.0)
+    log.reported("u0", Arrived(2), 50.0)
+    log.attempt_ended("u0", Outcome("line", AttemptResult.DONE, 1, 50.0), 50.0, 0.0)
+
+    (entry,) = log.executed_schedule(0.0)[UavId("u0")]
+    times_s = entry.depart_s, entry.arrive_s, entry.begin_s, entry.end_s
+    assert times_s == (0.0, 10.0, 30.0, 50.0)
 
 
 def test_an_attempt_of_which_is_told_late_ended_when_it_did() -> None:
