@@ -190,15 +190,14 @@ class Airway:
                 self._drop_wish()
             return
         here = self._fleet.rises_at_enu_m if self._rises else self._here()
-        if isinstance(order, Return) and self._aloft and self._comes_down:
+        down = isinstance(order, Return) and order.resume and self._vehicle.has_flown(way, order)
+        if isinstance(order, Return) and self._aloft and (self._comes_down or down):
             order = replace(order, path_enu_m=(), via_enu_m=self._vehicle.enu_m, land=True)
             here = None
         elif isinstance(order, Return) and not self._aloft:
             if way.flies and order.via_enu_m is not None:  # on its way up it has no other air
                 order = replace(order, path_enu_m=(), via_enu_m=way.path_enu_m[-1])
             here = None
-        elif isinstance(order, Return) and order.resume and self._vehicle.has_flown(way, order):
-            here = None  # told so by an earlier life, it lands there by itself
         elif here is None and self._aloft and self._vehicle.is_awaited(self._mission_view.now_s):
             again = partial(self.order, own_height=own_height, fixed=fixed, takes_s=takes_s)
             self._unplaced = partial(again, order)

@@ -13,9 +13,11 @@ from swarm.protocol.fields import Point
 from swarm.protocol.uav_messages import ClaimedWay
 
 _UP_M = 2.0
-"""Who is no farther below where its way begins has risen to there [m]."""
+"""Who is no farther below an end of its way is as high as that [m]."""
 _BESIDE_M = 5.0
 """Who climbs is no farther from there, seen from above [m]."""
+_LANDS_M = 2.0
+"""Nor who comes down at home [m]."""
 
 
 class PlaceOnWay:
@@ -60,14 +62,17 @@ class PlaceOnWay:
         return self._awaited_since_s + self._patience_s
 
     def has_flown(self, way: ClaimedWay, home: Return) -> bool:
-        """Whether it is at the end of ``way``, which leads where ``home`` does, or lands there."""
+        """Whether it comes down, or is down, where ``way`` ends, above which ``home`` leads.
+
+        As an earlier life told it to. Who is as high as the end of its way hovers in some layer.
+        """
         here, above = self.enu_m, home.via_enu_m
         if here is None or above is None or not (way.flies and way.path_enu_m):
             return False
         end = way.path_enu_m[-1]
-        if math.dist(end[:2], above[:2]) > _BESIDE_M or here[2] > end[2] + _UP_M:
+        if math.dist(end[:2], above[:2]) > _LANDS_M or here[2] > end[2] - _UP_M:
             return False
-        return math.dist(here[:2], end[:2]) <= _BESIDE_M
+        return math.dist(here[:2], end[:2]) <= _LANDS_M
 
     def land(self) -> None:
         """It is on the ground, wherever it said that it was last."""

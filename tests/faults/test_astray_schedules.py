@@ -33,6 +33,7 @@ BROKEN_ONCE = {
     11004872: "who hovered above its start for a mission that never began looked at no charge",
     11005429: "who was told on its way home that it is to fly home began that way anew, at rest",
     11005759: "who turned back for a drain on each short flight decided for the same task for ever",
+    11006086: "who hovered above its home in another layer went home through the one between",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

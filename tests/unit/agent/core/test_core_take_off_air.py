@@ -159,8 +159,11 @@ def test_who_has_flown_its_way_home_is_below_its_end_and_lands_by_itself() -> No
 
     for place_enu_m, lands in (
         ((20.0, 15.0, 36.0), False),
-        ((40.0, 29.0, 36.5), True),
+        ((40.0, 29.0, 36.5), False),
+        ((40.0, 29.0, 34.5), False),
+        ((40.0, 29.0, 33.5), True),
         ((40.0, 30.0, 12.0), True),
+        ((40.0, 27.0, 12.0), False),
         ((40.0, 30.0, 0.0), True),
         ((40.0, 30.0, 60.0), False),
     ):
