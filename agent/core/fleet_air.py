@@ -282,7 +282,7 @@ class FleetAir:
         begins, stops = wish.corners_enu_m[0], wish.corners_enu_m[-1]
         return any(
             math.dist(begins[:2], one[:2]) < _SPOT_M and math.dist(stops[:2], other[:2]) < _BESIDE_M
-            for one, *_, other in ((line, line[::-1]) if line else ())
+            for one, other in ([(line[0], line[-1]), (line[-1], line[0])] if line else [])
         )
 
     def _is_clear(self, begin_enu_m: Point, end_enu_m: Point) -> bool:
