@@ -31,7 +31,7 @@ BROKEN_ONCE = {
     9700274: "a sortie was counted from when it asked for its way up if that became a longer one",
     11001244: "the judge took a zone for gone of which the coordinator had not heard that it is",
     11004872: "who hovered above its start for a mission that never began looked at no charge",
-    11005429: "who was sent on to its base, as a zone was drawn elsewhere, began that way anew, at rest",
+    11005429: "who was sent on to its base, as a zone was drawn elsewhere, began anew at rest",
     11005759: "who turned back for a drain on each short flight decided for the same task for ever",
     11006086: "who hovered above its home in another layer went home through the one between",
     5000447: "who decided anew in a new zone waited there anew before it landed",
