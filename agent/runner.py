@@ -11,7 +11,8 @@ from __future__ import annotations
 import asyncio
 import contextlib
 from collections import Counter
-from collections.abc import Awaitable, Callable, Iterator, Mapping
+from collections.abc import Awaitable, Callable, Mapping
+from functools import partial
 from typing import Protocol
 
 from agent.core.agent_core import AgentCore
@@ -87,23 +88,12 @@ class _Dropping(Protocol):
     def dropped(self) -> Mapping[str, int]: ...
 
 
-class _Dropped(Mapping[str, int]):
-    """What several have dropped, as it stands whenever it is read."""
-
-    def __init__(self, *parts: _Dropping) -> None:
-        self._parts = parts
-
-    def _now(self) -> Counter[str]:
-        return sum((Counter(part.dropped) for part in self._parts), Counter[str]())
-
-    def __getitem__(self, reason: str) -> int:
-        return self._now()[reason]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._now())
-
-    def __len__(self) -> int:
-        return len(self._now())
+def _dropped_by(*parts: _Dropping) -> Counter[str]:
+    """What all of them have dropped so far, by reason."""
+    dropped = Counter[str]()
+    for part in parts:
+        dropped.update(part.dropped)
+    return dropped
 
 
 async def seat_or_stop(
@@ -298,7 +288,7 @@ class _Flight:
             crowd=lambda there: some_of(core.uav, there),
             shared=shared,
         )
-        core.dropped = _Dropped(self.shell)
+        core.dropped = partial(_dropped_by, self.shell)
 
     def _execute(self, action: Action) -> None:
         if isinstance(action, StationAction) and self.vehicle is not None:
@@ -311,7 +301,7 @@ class _Flight:
         flown = not isinstance(order, Return) or order.resume
         if self.vehicle is None and brief is not None and flown:
             self.vehicle = self._make_vehicle(brief, self._report)
-            self._core.dropped = _Dropped(self.shell, self.vehicle)
+            self._core.dropped = partial(_dropped_by, self.shell, self.vehicle)
             self.starting = asyncio.get_running_loop().create_task(self.vehicle.start())
             self.starting.add_done_callback(self._failed)
         if self.vehicle is not None:

@@ -11,7 +11,7 @@ others in agent.core.state_sync. Leaves out: flying (agent.vehicle) and transpor
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -111,7 +111,7 @@ class AgentCore(AgentPart):
     ) -> None:
         self.uav = uav
         self.replica = Replica()
-        self.dropped: Mapping[str, int] = {}
+        self.dropped: Callable[[], Mapping[str, int]] = dict
         """Messages the shell has dropped so far, by reason; goes out with the status."""
         self._mission = mission
         self._rejoin = rejoin
@@ -448,7 +448,7 @@ class AgentCore(AgentPart):
 
     def _status(self, now_s: float) -> Status:
         claim, telemetry = self.claim, self._mission_view.telemetry
-        dropped = Counter({**self.dropped, "stale": self.replica.stale})
+        dropped = Counter({**self.dropped(), "stale": self.replica.stale})
         return Status(
             phase=self.phase,
             task=None if claim is None else claim.task,

@@ -28,12 +28,14 @@ from swarm.protocol.messages import (
     TaskEntry,
 )
 from swarm.protocol.registers import without_signers
-from swarm.protocol.sync import EVERYONE_UP_TO, QuestionTimer, some_of
+from swarm.protocol.sync import EVERYONE_UP_TO, MOST_OPEN, QuestionTimer, some_of
 from swarm.protocol.timing import Timing, earliest, stretch_of
 from swarm.protocol.uav_messages import ClaimPhase, Nearby
 
 _LAST_WORDS = 3
 """How often others are asked again at least what somebody who was lost has said at last."""
+_REST = 4.0
+"""So many times as long as it took to catch up, who is held up again does not."""
 _WORTH_TELLING_S = 0.1
 """A correction of the mission clock by less is the network's."""
 
@@ -119,7 +121,7 @@ class StateSync(AgentPart):
         self._echoes.clear()
         self._learn_clock(snapshots, now_s)
         somebody_knows = any(isinstance(message.body, MissionConfig) for message in told)
-        self.queries.take(enough=somebody_knows and not self._machine.acts)
+        self.queries.take(now_s, enough=somebody_knows and not self._machine.acts)
         answered = {snapshot.writer for snapshot in snapshots}
         self._answered |= answered & self._peers.membership.present
         for writer in self._left_by:
@@ -295,7 +297,8 @@ class StateSync(AgentPart):
     def held_up(self, now_s: float) -> None:
         """This process was stopped or starved; what the others did meanwhile is unread."""
         self._peers.membership.held_up(now_s)
-        self._catch_up(now_s)
+        if self.queries.may_catch_up(now_s):
+            self._catch_up(now_s)
         self._log("held up")
 
     def lose(self, now_s: float) -> None:
@@ -342,13 +345,16 @@ class StateQueries:
         """Whether any question has been answered, be it by nobody."""
         self.current = False
         """Whether one has that was asked since the last doubt."""
-        self._asking = QuestionTimer(timing.ask_gap_s)
+        self._asking = QuestionTimer(timing.ask_gap_s, MOST_OPEN)
         self._ask_s = timing.ask_s
         self._again_at_s: float | None = None
         self._open = 0
         """Questions without an answer."""
         self._outdated = 0
         """Those of them that were asked before the last doubt."""
+        self._catching_up_since_s: float | None = None
+        """Since when it asks because it was held up."""
+        self._rests_until_s = -math.inf
         self._own = own
         self._everyone = False
         self._wanted: set[str] = set()
@@ -369,10 +375,25 @@ class StateQueries:
         self._everyone |= everyone
         self.want(now_s, of)
 
-    def take(self, *, enough: bool) -> None:
+    def may_catch_up(self, now_s: float) -> bool:
+        """Whether who was held up is to ask what the others did meanwhile; it does then.
+
+        Not who is held up again while it does, or soon after if that has taken long: a process that
+        has too much to do would only ask, decide nothing, and give the others more to do.
+        """
+        if self._catching_up_since_s is not None or now_s < self._rests_until_s:
+            return False
+        self._catching_up_since_s = now_s
+        return True
+
+    def take(self, now_s: float, *, enough: bool) -> None:
         """Answers have come; ``enough`` if they are up to date whenever they were asked for."""
+        self._asking.answered()
         self.ever = True
         self.current |= enough or self._open > self._outdated == 0
+        if self.current and self._catching_up_since_s is not None:
+            self._rests_until_s = now_s + _REST * (now_s - self._catching_up_since_s)
+            self._catching_up_since_s = None
         self._open, self._outdated = max(0, self._open - 1), max(0, self._outdated - 1)
 
     def questions(self, now_s: float, *, lacking: bool, present: Collection[str] = ()) -> list[Ask]:
@@ -383,8 +404,11 @@ class StateQueries:
         if self.current and not lacking:
             self._again_at_s = None
         elif self._again_at_s is not None and self._again_at_s <= now_s:
-            self._asking.want(now_s)
-            self._again_at_s = None  # until that question has been asked
+            if self._asking.is_full:
+                self._again_at_s = now_s + self._ask_s
+            else:
+                self._asking.want(now_s)
+                self._again_at_s = None  # until that question has been asked
         self._asking.stretch = stretch_of(len(present))
         if not self._asking.due(now_s):
             return []

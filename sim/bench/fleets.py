@@ -23,6 +23,8 @@ _ORIGIN = Origin(46.8, 9.7, 1100.0)
 
 BAND_M = 30.0, 110.0
 """Heights between which fleets that keep a separation fly in benchmarks [m]."""
+SPACING_M = 40.0
+"""Side of a square on which there is one task of a survey, on average [m]."""
 
 
 def survey_mission(
@@ -31,13 +33,16 @@ def survey_mission(
     seed: int,
     service_s: float = 2.0,
     separation_m: float | None = None,
+    spacing_m: float = SPACING_M,
 ) -> Mission:
     """UAVs in a row beside a square of tasks, as dense for every size of fleet.
+
+    There is one task on each square of ``spacing_m`` [m] by ``spacing_m``, on average.
 
     With ``separation_m`` [m] they share the layers of `BAND_M`, without it each has its own.
     """
     rng = np.random.default_rng(seed)
-    places_m = rng.uniform(0.0, 40.0 * n_task**0.5, (n_task, 2)).tolist()
+    places_m = rng.uniform(0.0, spacing_m * n_task**0.5, (n_task, 2)).tolist()
     return Mission(
         name="survey",
         horizon_s=3600.0,

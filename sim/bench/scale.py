@@ -23,7 +23,7 @@ from coordinator.mission_view.mission_state import MissionState
 from coordinator.recording.recorder import RecordedCore
 from coordinator.recording.records import RecordableFact
 from sim.bench.claim_delays import ClaimDelays
-from sim.bench.fleets import BAND_M, options_for, survey_mission
+from sim.bench.fleets import BAND_M, SPACING_M, options_for, survey_mission
 from sim.bench.machine import cpu_s, share_bytes, this_machine
 from sim.bench.results import BenchResult, Progress, quantile, unheard
 from sim.bench.turnaround import told_turnarounds
@@ -54,6 +54,8 @@ class ScaleSettings:
     sizes: tuple[int, ...] = (10, 50, 100, 200)
     """UAVs of each fleet."""
     tasks_per_uav: int = 6
+    spacing_m: float = SPACING_M
+    """There is one task on each square of that side, on average [m]."""
     watch_s: float = 30.0
     """Wall time of a mission over which is counted."""
     start_limit_s: float = 300.0
@@ -65,6 +67,11 @@ class ScaleSettings:
     separation_m: float | None = None
     """What the fleet keeps apart, in layers that it shares [m]; None: each has its own layer."""
     seed: int = 0
+
+    @property
+    def density_per_km2(self) -> float:
+        """UAVs on each square kilometre of the survey, in every fleet."""
+        return 1e6 / (self.tasks_per_uav * self.spacing_m**2)
 
 
 @dataclass(frozen=True, slots=True)
@@ -242,7 +249,9 @@ class ScaleBench(BenchResult):
         """See `BenchResult`."""
         settings = self.settings
         yield (
-            f"survey of {settings.tasks_per_uav} tasks for each UAV, {settings.method}, "
+            f"survey of {settings.tasks_per_uav} tasks for each UAV, "
+            f"{settings.spacing_m:g} m apart ({settings.density_per_km2:.3g} UAVs/km²), "
+            f"{settings.method}, "
             f"{settings.routers} router(s), {settings.agents_per_process} agent(s) in a process, "
             f"{POSITION_RATE_HZ:g} position reports a second, "
             f"{self._apart()}, watched for {settings.watch_s:g} s; seed {settings.seed}"
@@ -317,6 +326,7 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
         settings.tasks_per_uav * n_uav,
         settings.seed,
         separation_m=settings.separation_m,
+        spacing_m=settings.spacing_m,
     )
     count, clock = MessageCount(), SystemClock()
     tell(f"{n_uav} UAVs: starting")

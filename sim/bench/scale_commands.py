@@ -66,6 +66,16 @@ def scale(
             show_default=False,
         ),
     ] = None,
+    spacing_m: Annotated[
+        float,
+        typer.Option(
+            "--spacing-m",
+            min=10.0,
+            max=1000.0,
+            metavar="M",
+            help="One task on each square of that side, six for each UAV: 91 m are 20 UAVs/km².",
+        ),
+    ] = 40.0,
     seed: SeedOption = 0,
     json: JsonOption = False,
     plot: Annotated[
@@ -88,6 +98,7 @@ def scale(
         swarm bench scale --sizes 10,50 --watch-s 10 --json
         swarm bench scale --sizes 10,100,200 --agents-per-process 25
         swarm bench scale --sizes 10,100,200 --agents-per-process 25 --separation-m 6
+        swarm bench scale --sizes 100 --agents-per-process 50 --separation-m 6 --spacing-m 91
         swarm bench scale --plot scale.svg --out scale.md
     """
     from sim.bench.plan_report import write_figure
@@ -106,6 +117,7 @@ def scale(
         routers=routers,
         agents_per_process=agents_per_process,
         separation_m=separation_m,
+        spacing_m=spacing_m,
         seed=seed,
     )
     _warn_of_large(settings)

@@ -146,10 +146,10 @@ class Inbox:
             return False
         return True
 
-    def offer(self, event: BusEvent, latest: bool = False) -> None:
-        """Hand ``event`` over from the loop's own thread."""
+    def offer(self, event: BusEvent, latest: bool = False, *, admitted: bool = False) -> None:
+        """Hand ``event`` over from the loop's own thread; one ``admitted`` is not asked about."""
         with self._lock:
-            if not self._put(event, latest):
+            if not self._put(event, latest, admitted):
                 return
             self._waking = True
         self._ready.set()
@@ -173,9 +173,9 @@ class Inbox:
         if self.linger_s > 0.0:
             await asyncio.sleep(self.linger_s)
 
-    def _put(self, event: BusEvent, latest: bool) -> bool:
+    def _put(self, event: BusEvent, latest: bool, admitted: bool = False) -> bool:
         """Append under the lock, making room if there is none; False if it is not let in."""
-        if self.admits is not None and not self.admits(event):
+        if not admitted and self.admits is not None and not self.admits(event):
             return False
         if latest and isinstance(event, Sample):
             if event.key not in self._latest and len(self._latest) >= self._capacity:

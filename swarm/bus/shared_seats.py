@@ -219,7 +219,8 @@ class SharedSeats:
     def _tell(self, event: BusEvent) -> None:
         match event:
             case Sample():
-                self._hand_round(event)
+                if self._admits(event):
+                    self._hand_round(event)
             case TokenSeen(key) | TokenGone(key):
                 for key_expr, there in self._tokens.items():
                     if _matches(key_expr, key):
@@ -233,6 +234,14 @@ class SharedSeats:
                 self._linked = isinstance(event, LinkUp)
                 for seat in self._seats:
                     seat.inbox.offer(event)
+
+    def _admits(self, sample: Sample) -> bool:
+        """Whether it is let in, by the first seat's rules: all hear the same, and have the same.
+
+        So it is looked at once, and what is not let in is counted there alone.
+        """
+        admits = next((s.inbox.admits for s in self._seats if s.inbox.admits is not None), None)
+        return admits is None or admits(sample)
 
     def _hand_round(self, sample: Sample, but: SharedSeat | None = None) -> None:
         matching = self._matching.get(sample.key)
@@ -250,7 +259,7 @@ class SharedSeats:
                     seat.inbox.dropped += len(seat.waiting) == MOST_WAITING  # the oldest of them
                     seat.waiting.append((sample, how.latest))
                 else:
-                    seat.inbox.offer(sample, how.latest)
+                    seat.inbox.offer(sample, how.latest, admitted=True)
 
 
 class SharedSeat:
@@ -295,7 +304,7 @@ class SharedSeat:
         self._seats.gather()
         waiting, self.waiting = self.waiting, deque(maxlen=MOST_WAITING)
         for sample, latest in waiting:
-            self._inbox.offer(sample, latest)
+            self._inbox.offer(sample, latest, admitted=True)
 
     def unsubscribe(self, key_expr: str) -> None:
         """Receive nothing more by that very subscription."""

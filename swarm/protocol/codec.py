@@ -176,6 +176,9 @@ class Codec:
         """
         if known is not None and data == (known.said if self._seal is None else known.envelope):
             return known
+        heard = None if self._shared is None else self._shared.find(data)
+        if heard is not None and heard.key == key:
+            return heard
         try:
             sealed = is_envelope(data)
             limit_bytes = LARGE_LIMIT_BYTES + (ENVELOPE_BYTES if sealed else 0)

@@ -429,10 +429,11 @@ class Shell(Generic[E, A]):
                 if message is None:
                     return None
                 self._tell_newer()
-                if isinstance(message.body, SignedRoster):  # what came before was said before
-                    self._tell_heard()
-                self._heed([message])
-                self._expect([message])
+                if isinstance(message.body, SignedRoster):
+                    self._tell_heard()  # what came before was said before
+                    self._heed([message])
+                elif isinstance(message.body, MissionConfig):
+                    self._expect([message])
                 return MessageReceived(message)
             case TokenSeen(key):
                 writer = self._keys.writer_of_token(key)

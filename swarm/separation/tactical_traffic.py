@@ -213,6 +213,8 @@ class NearbyTrack:
 
     def forgive(self, now_s: float) -> None:
         """Time passes."""
+        if self.cost_s == 0.0:
+            return
         since_s = max(self._counted_s, self._blamed_s + _GRUDGE_S)
         self.cost_s = max(0.0, self.cost_s - _FORGIVEN * max(0.0, now_s - since_s))
         self._counted_s = now_s
@@ -365,20 +367,23 @@ class TrafficPicture:
 
     def near(self, place_m: Place, now_s: float) -> Iterator[tuple[str, NearbyTrack]]:
         """Those who matter to a UAV at that place, in the order of their ids."""
-        for uav, track in sorted(self._tracks.items()):
+        reach_m, fastest_m_s = self._rules.reach_m, self._rules.fastest_m_s
+        near = list[str]()
+        for uav, track in list(self._tracks.items()):
             track.forgive(now_s)
             age_s = now_s - track.said_s
             if age_s > FORGET_S:
                 self.forget(uav)
-                continue
+            elif math.dist(place_m, track.word.position_enu_m) <= reach_m + fastest_m_s * age_s:
+                near.append(uav)
+        for uav in sorted(near):
+            track = self._tracks[uav]
             if not track.is_believed(now_s):
                 continue
-            away_m = math.dist(place_m, track.word.position_enu_m)
-            if away_m <= self._rules.reach_m + self._rules.fastest_m_s * age_s:
-                if track.is_silent(now_s) and self._has_left(track, place_m, now_s):
-                    self.forget(uav)
-                    continue
-                yield uav, track
+            if track.is_silent(now_s) and self._has_left(track, place_m, now_s):
+                self.forget(uav)
+                continue
+            yield uav, track
 
     def _has_left(self, track: NearbyTrack, place_m: Place, now_s: float) -> bool:
         """Whether it is no wonder that it is not heard: it has flown on, as it said."""

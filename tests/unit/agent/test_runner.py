@@ -395,8 +395,8 @@ def test_the_core_is_told_what_was_dropped() -> None:
             await until(lambda: played.core.replica.known(said) == said, "hearing u1")
             vehicle.dropped["unsigned"] = 3
 
-            assert played.core.dropped == {"malformed": 2, "unsigned": 3}
+            assert played.core.dropped() == {"malformed": 2, "unsigned": 3}
             played.core.replica.overfull = 4
-            assert played.core.dropped == {"malformed": 2, "unsigned": 3, "no room": 4}
+            assert played.core.dropped() == {"malformed": 2, "unsigned": 3, "no room": 4}
 
     play(scenario)

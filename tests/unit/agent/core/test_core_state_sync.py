@@ -20,6 +20,7 @@ from swarm.protocol.events import (
     SnapshotsReceived,
 )
 from swarm.protocol.messages import Body, Snapshot, TaskEntry
+from swarm.protocol.sync import MOST_OPEN
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import ClaimPhase, Outcome, Status, StatusPhase
 from tests.support.builders import (
@@ -148,15 +149,43 @@ def test_a_claim_known_by_hearsay_counts_no_longer_than_its_writer_may_be_silent
     assert agent.task == "far"
 
 
-def test_without_an_answer_it_asks_again_and_again() -> None:
+def test_without_an_answer_it_asks_again_but_lets_no_questions_pile_up() -> None:
+    """Each ends some time; where answers are read slowly, more of them would only take longer."""
     agent = flying(NEAR, FAR)
     agent.arrive(10.0)
 
-    assert asks(agent.run_until(10.0 + 3.5 * TIMING.ask_s)) == 3
+    assert asks(agent.run_until(10.0 + 9.5 * TIMING.ask_s)) == MOST_OPEN - 1
     assert agent.phase is ClaimPhase.IDLE
     assert asks(answer_all(agent)) == 0
     assert agent.task == "far"
     assert asks(agent.run_until(30.0)) == 0
+
+
+def test_who_is_held_up_again_before_it_has_caught_up_does_not_begin_anew() -> None:
+    agent = flying(NEAR, FAR)
+    assert asks(agent.arrive(10.0)) == 1
+
+    actions = agent.tick(20.0)
+    assert "held up" in notes(actions)
+    answer_all(agent)
+    assert agent.task == "far"
+
+
+def test_who_took_long_to_catch_up_decides_though_it_is_held_up_again() -> None:
+    """There is too much to do: to ask again and again would be more, and decide nothing."""
+    agent = flying(NEAR, FAR, entry("third", east_m=30.0, number=2))
+    agent.arrive(10.0)
+    agent.run_until(15.0)
+    answer_all(agent)
+    assert agent.task == "far"
+    asked = asks(agent.log)
+
+    assert "held up" in notes(agent.arrive(25.0))
+    assert agent.task == "third"
+    assert asks(agent.log) == asked
+
+    assert "held up" in notes(agent.tick(36.0))
+    assert asks(agent.log) == asked + 1
 
 
 def test_a_little_delay_is_no_matter() -> None:
@@ -260,6 +289,7 @@ def test_one_who_speaks_again_is_back_and_asked() -> None:
     agent = flying(NEAR, timing=Timing())
     agent.hear("u1", IDLE, 1.0)
     agent.run_until(2.0 + agent.timing.silence_s)
+    answer_all(agent)
     actions = agent.hear("u1", IDLE)
 
     assert told(actions, "back") == [{"writer": "u1"}]

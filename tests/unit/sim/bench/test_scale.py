@@ -199,3 +199,12 @@ def test_a_fleet_that_keeps_apart_shares_the_layers_of_a_band() -> None:
     kept = survey_mission(3, 6, 0, separation_m=6.0)
     assert (kept.separation_m, kept.band_m) == (6.0, (30.0, 110.0))
     assert replace(kept, separation_m=None, band_m=None) == survey_mission(3, 6, 0)
+
+
+def test_a_thinner_survey_is_the_same_one_drawn_larger() -> None:
+    dense, thin = survey_mission(3, 6, 0), survey_mission(3, 6, 0, spacing_m=80.0)
+    for near, far in zip(dense.tasks, thin.tasks, strict=True):
+        assert far.position_enu_m == pytest.approx([2.0 * each for each in near.position_enu_m])
+    assert ScaleSettings(tasks_per_uav=5, spacing_m=100.0).density_per_km2 == pytest.approx(20.0)
+    told = "".join(str(part) for part in replace(BENCH, settings=ScaleSettings()).parts())
+    assert "40 m apart (104 UAVs/km²)" in told

@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from swarm.bus.port import LinkDown, LinkUp, Sample, TokenGone, TokenSeen
+from swarm.bus.port import BusEvent, LinkDown, LinkUp, Sample, TokenGone, TokenSeen
 from swarm.bus.shared_seats import SharedSeat, SharedSeats
 from swarm.runtime.errors import BusError
 from tests.support.memory_bus import MemoryBus, MemoryNetwork
@@ -120,6 +120,36 @@ def test_one_that_comes_while_others_gather_hears_all_with_what_they_gather() ->
         assert [s for s in a.inbox.take() if isinstance(s, Sample)] == [Sample("claims", b"2")]
         heard = [s for s in b.inbox.take() if isinstance(s, Sample)]
         assert heard == [Sample("claims", b"1"), Sample("claims", b"2")]
+
+    play(scenario)
+
+
+@pytest.mark.parametrize("gathered", [False, True])
+def test_what_comes_is_admitted_once_for_all_seats(gathered: bool) -> None:
+    async def scenario(seats: SharedSeats, opened: list[RecordedBus]) -> None:
+        abc = await three(seats)
+        asked: list[tuple[int, BusEvent]] = []
+        for number, seat in enumerate(abc):
+            seat.subscribe("claims", gathered=gathered)
+
+            def admits(event: BusEvent, number: int = number) -> bool:
+                asked.append((number, event))
+                return event != Sample("claims", b"flood")
+
+            seat.inbox.admits = admits
+        await settled()
+        asked.clear()
+        other = opened[0].network.join("another process")
+        for payload in (b"flood", b"word"):
+            other.publish("claims", payload)
+        await settled()
+        for seat in abc:
+            seat.gather()
+
+        assert asked == [(0, Sample("claims", b"flood")), (0, Sample("claims", b"word"))]
+        for seat in abc:
+            heard = [event for event in seat.inbox.take() if isinstance(event, Sample)]
+            assert heard == [Sample("claims", b"word")]
 
     play(scenario)
 
