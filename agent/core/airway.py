@@ -16,7 +16,7 @@ from dataclasses import replace
 from functools import partial
 
 from agent.core.base_stand import BaseStand
-from agent.core.fleet_air import ASIDE_PATIENCE, GIVES_UP_S, STOP_LEG, FleetAir, Wish
+from agent.core.fleet_air import ASIDE_PATIENCE, GIVES_UP_S, STOP_LEG, FleetAir
 from agent.core.interface import (
     Action,
     Arrived,
@@ -40,6 +40,7 @@ from agent.core.interface import (
 from agent.core.kept_air import KeptAir
 from agent.core.mission_view import MissionView, Peers
 from agent.core.place_on_way import PlaceOnWay
+from agent.core.wish import Wish
 from swarm.protocol.events import LogLine
 from swarm.protocol.fields import Point
 from swarm.protocol.registers import Replica
@@ -73,9 +74,9 @@ class Airway:
         """Is told when the vehicle is sent off after a wait."""
         self.when_detoured: Callable[[], None] = lambda: None
         """Is told when it is sent off by a longer way than was reckoned with."""
-        self.sortie_end_s: Callable[[], float] = lambda: math.inf
-        """By when the UAV must have landed, its reserve kept [s mission time]."""
         self._fleet = FleetAir(uav, replica, mission_view, peers)
+        self.last_departure = self._fleet.last_departure
+        """What the battery allows."""
         self._way: ClaimedWay | None = None
         self._aloft = self._moves = self._stops = False
         """Whether the vehicle may be anywhere on its way, and has been told to stop on it."""
@@ -324,7 +325,7 @@ class Airway:
         claim = self._replica.claims.get(self._uav)
         if self._shared is None or claim is None:
             return None
-        now = self.told(self._stand.left(claim, self.sortie_end_s()))
+        now = self.told(self._stand.left(claim, self.last_departure.sortie_end_s()))
         if adds_nothing(now.way, claim.way) and (now.base, now.stage) == (claim.base, claim.stage):
             return None
         return now
@@ -352,8 +353,8 @@ class Airway:
             self._looks_again = self._clear_behind(air) if flies else self._make_room(air, now_s)
         if self._moves and self._aloft:
             return []
-        wish, end_s = self._wish, self.sortie_end_s()
-        if wish is not None and self._aloft and self._fleet.must_land(wish, end_s, self._retry_s):
+        wish, battery = self._wish, self.last_departure
+        if wish is not None and self._aloft and battery.must_land(wish, self._retry_s):
             return self._come_down(wish)
         if self._aside is not None:
             if now_s - self._aside.since_s > ASIDE_PATIENCE * self._retry_s:
@@ -362,7 +363,7 @@ class Airway:
                 self._pursue(air, self._aside, now_s)
         if wish is None or self._aside is not None:
             return []
-        spent = wish.asked and self._fleet.ends_too_late(wish, end_s)
+        spent = wish.asked and battery.ends_too_late(wish)
         if wish.task is not None and (now_s - wish.since_s > GIVES_UP_S or spent):
             self._wish = None
             self._way = hovering(self._told_way)
@@ -395,9 +396,8 @@ class Airway:
     def _ask(self, air: SharedAir, wish: Wish, *, again: bool) -> None:
         """Ask for the nearest layer in which nobody is in the way, else for one to wait for."""
         here, aside = hovering(self._told_way), wish is self._aside
-        end_s = self.sortie_end_s() if self._aloft else None
-        number = max(self._told_way.number + 1, round(1e3 * self._fleet.mission_s))
-        found = self._fleet.way(air, wish, here, self._claims(), number, end_s, aside=aside)
+        grounded = not self._aloft
+        found = self._fleet.way(air, wish, here, self._claims(), grounded=grounded, aside=aside)
         if found is not None and (found.is_free or ((again or not wish.asked) and not aside)):
             self._request(wish, found.way, again=again)
         elif aside:

@@ -6,25 +6,25 @@ Leaves out: asking, granting and setting off (agent.core.airway).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import accumulate, pairwise
 
 import numpy as np
 
 from agent.core.interface import GoTo, Prepare, Return
+from agent.core.last_departure import LastDeparture
 from agent.core.mission_view import MissionView, Peers
 from agent.core.own_layer import OwnLayer
+from agent.core.wish import Wish
 from agent.core.zone_stay import ZoneStay
-from swarm.allocation.problem import rest_to_rest_s
-from swarm.protocol.calibration import FlightRates
 from swarm.protocol.fields import Point
-from swarm.protocol.messages import MissionConfig, UavSpec
+from swarm.protocol.messages import MissionConfig
 from swarm.protocol.operator_commands import zones_in_force
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import MOST_CORNERS, Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, air_of_brief, strength
-from swarm.separation.shifted import length_m, shifted_path
+from swarm.separation.shifted import shifted_path
 from swarm.separation.slabs import apart
 from swarm.separation.straight_pieces import not_flown, thinned
 from swarm.separation.taken_ways import is_home
@@ -37,20 +37,8 @@ ASIDE_PATIENCE = 4.0
 """How long a UAV waits for its way aside, in intervals at which it asks anew."""
 GIVES_UP_S = 10.0
 """How long a UAV waits for a way to a task before it looks for another task [s]."""
-LEAVES_ZONE_S = 5.0
-"""How long it waits for a way out of a zone that is drawn over it before it lands there [s]."""
-PATIENT_S = 300.0
-"""How long one whose battery has no end waits for its way home before it lands where it is [s]."""
-_TRIES = 2.0
-"""How long it asks for a way home at least, in intervals at which it asks anew."""
-_OF_RESERVE = 0.5
-"""Share of the reserve that a wait for the way home may use up."""
-_MOST_OF_RESERVE = 0.75
-"""Share of it that the wait and a climb on the way may use up together."""
 _TURNS = 2
 """Corners that a way in another layer has more than one in the own layer, at most."""
-_LONGER_M = 0.5
-"""A way is as it was reckoned, to so much [m]."""
 _ASIDE_M = (1.5, 3.0, 6.0, 12.0)
 """How far somebody steps aside, in separations."""
 _DIRECTIONS = 8
@@ -58,48 +46,6 @@ _SPOT_M = 1.0
 """Who stands no farther from its start, seen from above, stands there [m]."""
 _BESIDE_M = 0.1
 """Who is farther from a place, seen from above, is beside it."""
-
-
-@dataclass(slots=True)
-class Wish:
-    """An order that waits for its way."""
-
-    order: GoTo | Return | Prepare
-    since_s: float
-    corners_enu_m: tuple[Point, ...]
-    """In the own layer, from where the UAV is to where the order ends [m]."""
-    own_height: bool = False
-    """The height of its end is the task's."""
-    fixed: bool = False
-    """All of it is flown at the heights that it has."""
-    out_of_layer: bool = False
-    """It begins at the height of a task."""
-    takes_s: float | None = None
-    """How long its way takes, as reckoned [s]; None: nobody has said."""
-    retry_at_s: float = -math.inf
-    asked: bool = False
-    """Whether the own claim asks for it."""
-    yielded: set[tuple[str, int]] = field(default_factory=set)
-    """Requests of others to which it has given way."""
-
-    @property
-    def task(self) -> str | None:
-        """To which task it leads."""
-        return self.order.task if isinstance(self.order, GoTo) else None
-
-    @property
-    def climbs(self) -> bool:
-        """Whether it leads from the layer, or to it."""
-        return (self.out_of_layer or self.own_height) and not self.fixed
-
-    @property
-    def end_enu_m(self) -> Point | None:
-        """Where it ends if that keeps its height [m]."""
-        return self.corners_enu_m[-1] if self.own_height else None
-
-    def is_shorter_than(self, path_enu_m: Sequence[Point]) -> bool:
-        """Whether that path leads a longer way than was reckoned with."""
-        return length_m(path_enu_m) > length_m(self.corners_enu_m) + _LONGER_M
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,6 +70,7 @@ class FleetAir:
         self._lost_s: dict[str, float] = {}
         """Who is lost, and since when [s mission time]."""
         self._zone_stay = ZoneStay(uav, replica, mission_view)
+        self.last_departure = LastDeparture(mission_view, self._zone_stay)
         self.layer = OwnLayer(replica, mission_view)
 
     @property
@@ -224,9 +171,8 @@ class FleetAir:
         wish: Wish,
         here: ClaimedWay,
         claims: Mapping[str, Claim],
-        number: int,
-        sortie_end_s: float | None,
         *,
+        grounded: bool,
         aside: bool,
     ) -> FoundWay | None:
         """The nearest layer in which nobody is in the way, else one to wait for; None: neither.
@@ -238,17 +184,16 @@ class FleetAir:
             wish: what is to be flown.
             here: where the UAV hovers; no path of one that stands on the ground.
             claims: of everyone, the own one as it is about to be said.
-            number: of the request.
-            sortie_end_s: by when it must have landed, its reserve kept [s mission time]; None for
-                one on the ground, which may wait.
+            grounded: it is on the ground, where it may wait.
             aside: it is to make room, wherever that leads.
         """
-        expired, grounded = self.expired(), sortie_end_s is None
+        expired = self.expired()
+        number = max(here.number + 1, round(1e3 * self.mission_s))
         fallback: tuple[int, ClaimedWay] | None = None
         for shift_m, corners in self.ways(air, wish, here.shift_m, aside=aside):
             start = here.path_enu_m[0] if here.path_enu_m else corners[0]
             path = shifted_path(start, corners, shift_m, wish.end_enu_m)
-            late = sortie_end_s is not None and not self.can_fly(wish, path, sortie_end_s)
+            late = not grounded and not self.last_departure.can_fly(wish, path)
             if late or not self.layer.is_over(path):
                 continue
             array = np.array(path)
@@ -292,60 +237,6 @@ class FleetAir:
         problem = self._mission_view.board.field_problem
         network = None if problem is None else problem.network
         return network is not None and network.is_clear(begin_enu_m, end_enu_m)
-
-    def sets_off_by_s(self, wish: Wish, sortie_end_s: float, climb_s: float = 0.0) -> float:
-        """Until when it can set off on its way home, or wait for it [s mission time].
-
-        Args:
-            wish: for that way.
-            sortie_end_s: by when it must have landed, its reserve kept [s mission time].
-            climb_s: what its way takes beside what was reckoned [s].
-        """
-        me = self._mission_view.me
-        if me is None or me.endurance_s is None or math.isinf(sortie_end_s):
-            return self._mission_view.mission_s(wish.since_s) + PATIENT_S
-        way_s = _way_s(wish, me)
-        return sortie_end_s + _OF_RESERVE * self._reserve_s(me) - way_s - climb_s
-
-    def ends_too_late(self, wish: Wish, sortie_end_s: float) -> bool:
-        """Whether its way, set off on now, would end when it must have landed already."""
-        me = self._mission_view.me
-        return me is not None and self.mission_s + _way_s(wish, me) > sortie_end_s
-
-    def can_fly(self, wish: Wish, path_enu_m: Sequence[Point], sortie_end_s: float) -> bool:
-        """Whether its battery lasts for a way home that climbs into another layer first."""
-        me = self._mission_view.me
-        if me is None or wish.task is not None:
-            return True
-        upright_m = [math.dist(a, b) for a, b in pairwise(path_enu_m) if a[:2] == b[:2]]
-        if not upright_m:
-            return True
-        climb_s = float(
-            rest_to_rest_s(
-                np.array(upright_m), me.speed_m_s, me.acceleration_m_s2 or math.inf
-            ).sum()
-        )
-        more_s = (_MOST_OF_RESERVE - _OF_RESERVE) * self._reserve_s(me)
-        return self.mission_s <= self.sets_off_by_s(wish, sortie_end_s, climb_s) + more_s
-
-    def _reserve_s(self, me: UavSpec) -> float:
-        """How long its reserve lasts [s], as fast as its battery has been found to drain."""
-        told = FlightRates.believed(self._replica.calibrations.get(self._uav), me)
-        return me.reserve_frac * (me.endurance_s or 0.0) / told.drain_frac
-
-    def must_land(self, wish: Wish, sortie_end_s: float, retry_s: float) -> bool:
-        """Whether it can't wait any longer for a way home, or out of a zone.
-
-        Args:
-            wish: for a way, wherever it leads.
-            sortie_end_s: by when it must have landed, its reserve kept [s mission time].
-            retry_s: how long it takes until it looks again [s].
-        """
-        if self._zone_stay.lasts_s(wish.corners_enu_m[0]) > LEAVES_ZONE_S:
-            return True
-        waited_s = self._mission_view.now_s - wish.since_s
-        late = self.mission_s + retry_s > self.sets_off_by_s(wish, sortie_end_s)
-        return late and wish.task is None and waited_s > _TRIES * retry_s
 
     def way_out(self, wish: Wish, retry_s: float) -> Wish | None:
         """A wish to leave first the zone in which it waits for a way that leads farther.
@@ -490,10 +381,3 @@ class FleetAir:
     def mission_s(self) -> float:
         """Mission time of the step that is under way [s]."""
         return self._mission_view.mission_s(self._mission_view.now_s)
-
-
-def _way_s(wish: Wish, me: UavSpec) -> float:
-    """How long that way takes [s]."""
-    if wish.takes_s is not None:
-        return wish.takes_s
-    return length_m(wish.corners_enu_m) / me.speed_m_s

@@ -60,7 +60,8 @@ class Flights(AgentPart):
         """Is told of every leg."""
         context.airway.when_departed = self.meter.depart_late
         context.airway.when_detoured = self.meter.disturb
-        context.airway.sortie_end_s = lambda: self.meter.sortie.end_s
+        context.airway.last_departure.sortie_end_s = lambda: self.meter.sortie.end_s
+        context.airway.last_departure.drain_frac = lambda: self.meter.cautious_drain_frac
         self._zones: tuple[ZoneSpec, ...] = ()
         self._home: HomeFlight | None = None
         self._home_from: object = None

@@ -30,10 +30,12 @@ BROKEN_ONCE = {
     9004022: "who lost its task right after take-off was stopped where it had stood, underground",
     9700274: "a sortie was counted from when it asked for its way up if that became a longer one",
     11001244: "the judge took a zone for gone of which the coordinator had not heard that it is",
+    11002437: "who waited for its way home took its reserve for what lasts as long as planned",
     11004872: "who hovered above its start for a mission that never began looked at no charge",
     11005429: "who was sent on to its base, as a zone was drawn elsewhere, began anew at rest",
     11005759: "who turned back for a drain on each short flight decided for the same task for ever",
     11006086: "who hovered above its home in another layer went home through the one between",
+    13000758: "who could not come home any more went on asking for its way, and set off on it",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

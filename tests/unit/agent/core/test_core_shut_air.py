@@ -6,8 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from agent.core.fleet_air import LEAVES_ZONE_S, STOP_LEG
+from agent.core.fleet_air import STOP_LEG
 from agent.core.interface import Arrived, GoTo, Return
+from agent.core.last_departure import LEAVES_ZONE_S
 from agent.core.states import AgentState
 from swarm.protocol.events import LinkChanged
 from swarm.protocol.fields import Point

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import pytest
 
-from agent.core.fleet_air import FleetAir, Wish
+from agent.core.fleet_air import FleetAir
 from agent.core.interface import GoTo
 from agent.core.mission_view import MissionView, Peers
+from agent.core.wish import Wish
 from swarm.protocol.fields import Point
 from tests.support.builders import entry
 from tests.support.field_agent import FieldAgent
