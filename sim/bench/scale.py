@@ -106,6 +106,8 @@ class ScaleRun:
     """Processes that wanted to run during the last minute of it."""
     nearest_m: float | None = None
     """The nearest that two in flight came to each other until then; None: never two were."""
+    nearest_error_m: float | None = None
+    """How far that may be off: large fleets tell where they are every second or less often."""
 
     @property
     def agent_cpu_frac(self) -> float:
@@ -189,6 +191,7 @@ class ScaleBench(BenchResult):
                 Column("agent's CPU", ".2f", "%", 100.0),
                 Column("all CPU", ".0f", "%", 100.0),
                 Column("nearest", ".1f", "m", none="-"),
+                Column("±", ".1f", "m", none="-"),
                 Column("lost"),
                 Column("load", ".1f"),
             ),
@@ -202,6 +205,7 @@ class ScaleBench(BenchResult):
                     run.agent_cpu_frac,
                     sum(run.cpu_frac.values()),
                     run.nearest_m,
+                    run.nearest_error_m,
                     run.lost + run.ended,
                     run.load,
                 )
@@ -383,6 +387,7 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
         ended=ended,
         load=os.getloadavg()[0],
         nearest_m=None if near is None else near.distance_m,
+        nearest_error_m=None if near is None else near.error_m,
     )
 
 

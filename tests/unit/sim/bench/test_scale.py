@@ -201,6 +201,18 @@ def test_a_fleet_that_keeps_apart_shares_the_layers_of_a_band() -> None:
     assert replace(kept, separation_m=None, band_m=None) == survey_mission(3, 6, 0)
 
 
+def test_how_near_two_came_is_told_with_how_far_that_may_be_off() -> None:
+    told = replace(BENCH, runs=(replace(SMALL, nearest_m=4.3, nearest_error_m=18.0),))
+    (run,) = told.as_json()["runs"]
+
+    assert (run["nearest_m"], run["nearest_error_m"]) == (4.3, 18.0)
+    markdown = told.as_markdown()
+    heads, row = (next(line for line in markdown.splitlines() if key in line) for key in ("nearest", "4.3"))
+    cells = dict(zip(heads.split("|"), row.split("|"), strict=True))
+    assert cells[" nearest [m] "].strip() == "4.3"
+    assert cells[" ± [m] "].strip() == "18.0"
+
+
 def test_a_thinner_survey_is_the_same_one_drawn_larger() -> None:
     dense, thin = survey_mission(3, 6, 0), survey_mission(3, 6, 0, spacing_m=80.0)
     for near, far in zip(dense.tasks, thin.tasks, strict=True):
