@@ -206,8 +206,8 @@ def test_how_near_two_came_is_told_with_how_far_that_may_be_off() -> None:
     (run,) = told.as_json()["runs"]
 
     assert (run["nearest_m"], run["nearest_error_m"]) == (4.3, 18.0)
-    markdown = told.as_markdown()
-    heads, row = (next(line for line in markdown.splitlines() if key in line) for key in ("nearest", "4.3"))
+    lines = told.as_markdown().splitlines()
+    heads, row = (next(line for line in lines if key in line) for key in ("nearest", "4.3"))
     cells = dict(zip(heads.split("|"), row.split("|"), strict=True))
     assert cells[" nearest [m] "].strip() == "4.3"
     assert cells[" ± [m] "].strip() == "18.0"
