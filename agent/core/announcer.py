@@ -17,6 +17,8 @@ _LONGEST_NOTE = 200
 """Characters of a status's note; an autopilot's words may be longer."""
 _OUTCOMES_AT_ONCE = 4
 """Outcomes in one announcement; others that missed more ask when they are back."""
+_EARLY = 0.5
+"""Share of the interval of statuses in small fleets by which one in a large fleet may be early."""
 
 
 class Announcer:
@@ -170,7 +172,9 @@ class Announcer:
             self._announce_at_s = min(self._announce_at_s, now_s + self._timing.announce_s)
         if learned and (self._announce_at_s is None or self._announce_at_s <= now_s):
             said += self.announce(now_s)
-        if self._status_at_s is None or self._status_at_s <= now_s:
+        # Of many, a status that is due soon is said now: each step of its own costs as much again.
+        soon_s = now_s + (_EARLY * self._timing.status_s if self._stretch > 1.0 else 0.0)
+        if self._status_at_s is None or self._status_at_s <= soon_s:
             stretch = min(self._stretch, MOST_STATUS_STRETCH)
             self._status_at_s = now_s + stretch * self._timing.status_s
             said.append(self.say(status()))

@@ -59,6 +59,8 @@ _ALOFT_M = 1.0
 """Who is that far above where it started flies."""
 _LIKELY_AGE_S = 0.2
 """Of a word, as long as nobody knows the mission's time."""
+_EARLY = 0.2
+"""Share of a tick by which it decides or says where it is too soon, if it takes a step anyway."""
 _OLD_S = 10.0
 """Words that are older, or as far in the future, are somebody else's repeating."""
 _FLOWN_M = 6.0
@@ -187,14 +189,17 @@ class NearTraffic(AgentPart):
                 self._heed(action.order)
                 if keeps_apart:
                     self._await_turn(action.order)
-        if not keeps_apart or self._telemetry is None:
+        rules = self._rules
+        if not keeps_apart or self._telemetry is None or rules is None:
             return
-        if not (self._ordered or now_s >= min(self._decide_at_s, self._say_at_s)):
+        # What is due soon is done now, and with it what is within a tick: each step costs as much.
+        due_s = min(self._decide_at_s, self._say_at_s) - _EARLY * rules.tick_s
+        if not (self._ordered or now_s >= due_s):
             return
         own, aloft = self._own(self._telemetry), self._is_aloft(self._telemetry)
         self._is_let_go &= not aloft
         self._tune_in(own.position_enu_m)
-        if self._ordered or now_s >= self._decide_at_s:
+        if self._ordered or now_s + rules.tick_s >= self._decide_at_s:
             self._decide_at_s = now_s + BEACON_S
             self._take_turn(own, now_s)
             if aloft:
@@ -392,7 +397,7 @@ class NearTraffic(AgentPart):
         turns = said[:-1] != self._said[:-1]
         if said != self._said:
             self._say_at_s = min(self._say_at_s, self._said_s + rules.tick_s)
-        if now_s < self._say_at_s:
+        if now_s + rules.tick_s < self._say_at_s:
             return
         if aloft:
             self._grounded_since_s = None

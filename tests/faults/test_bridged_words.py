@@ -14,7 +14,8 @@ from sim.world.engine import Process
 from swarm.protocol.events import LogLine
 from swarm.protocol.messages import Message
 from swarm.protocol.uav_messages import Nearby
-from swarm.separation.tactical_traffic import SILENT_S
+from swarm.separation.tactical import Advice, OwnFlight, TacticalResolver
+from swarm.separation.tactical_traffic import SILENT_S, TrafficPicture
 from tests.support.bridged_crossings import CrossingFleet, mission_of
 
 KIND = (FirmwareModelName.ARDUPILOT, CommandStyle.REPOSITION)
@@ -108,3 +109,26 @@ def test_a_turn_is_said_each_tick_until_it_has_surely_been_heard(
     for at_s in turns_s[:2]:
         assert words.count("u0", at_s, at_s + SILENT_S) >= 11, words.of["u0"]
         assert words.count("u0", at_s + SILENT_S + 0.5, at_s + SILENT_S + 4.5) <= 5
+
+
+def test_who_has_to_decide_and_to_speak_does_both_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each step of its own costs as much again, and there are four of either in a second."""
+    decided_s: dict[str, list[float]] = defaultdict(list)
+    decide = TacticalResolver.decide
+
+    def noted(
+        self: TacticalResolver, own: OwnFlight, picture: TrafficPicture, now_s: float
+    ) -> Advice:
+        decided_s[self._uav].append(now_s)
+        return decide(self, own, picture, now_s)
+
+    monkeypatch.setattr(TacticalResolver, "decide", noted)
+    monkeypatch.setattr("agent.core.fleet_air.air_of_brief", lambda _brief: None)
+    words = flown(monkeypatch, ((-80.0, 0.0), (80.0, 3.0)), ((80.0, 3.0), (-80.0, 0.0)))
+
+    for uav in ("u0", "u1"):
+        said_s = [
+            at_s for at_s, word in words.of[uav] if word.airborne and at_s >= decided_s[uav][0]
+        ]
+        apart = {round(at_s, 3) for at_s in (*decided_s[uav], *said_s)}
+        assert len(apart) <= 1.05 * max(len(decided_s[uav]), len(said_s))
