@@ -7,6 +7,8 @@ flies later: the wait is no part of the decision. Leaves out: who finds nothing 
 
 from __future__ import annotations
 
+import math
+
 from swarm.protocol.messages import Message
 from swarm.protocol.uav_messages import Claim, ClaimPhase, Outcome
 
@@ -19,12 +21,15 @@ class ClaimDelays:
         """Each, as the observer's clock of the mission has it [ms]."""
         self._free_since_s: dict[str, float] = {}
         """By UAV whose service is over, and of which nothing was heard since: when it was."""
+        self._ended_s: dict[str, float] = {}
+        """By UAV, when its last service was over: outcomes are said again and again."""
 
     def hear(self, message: Message, mission_s: float | None) -> None:
         """The observer hears that at a mission time [s], None: the mission has not begun."""
         match message.body:
-            case Outcome() as outcome:
-                self._free_since_s[message.writer] = outcome.completed_s
+            case Outcome(completed_s=ended_s):
+                if ended_s > self._ended_s.get(message.writer, -math.inf):
+                    self._free_since_s[message.writer] = self._ended_s[message.writer] = ended_s
             case Claim() as claim:
                 free_s = self._free_since_s.get(message.writer)
                 if free_s is None or claim.decided_s < free_s:

@@ -113,6 +113,8 @@ def test_a_decision_is_timed_until_an_observer_has_heard_what_is_claimed_next() 
         (106.0, "u1", done("t2", completed_s=6.0)),
         (106.01, "u1", replace(IDLE, decided_s=6.0)),
         (109.0, "u1", replace(held("t3", 9.0), phase=ClaimPhase.PROPOSED)),
+        (110.0, "u0", done("t0", completed_s=5.0)),  # said again
+        (130.0, "u0", replace(held("t4", 29.9), phase=ClaimPhase.PROPOSED)),
     ]
     for number, (now_s, writer, body) in enumerate(facts, 1):
         core.step(MessageReceived(message(writer, body, number)), now_s)
