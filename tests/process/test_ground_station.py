@@ -51,8 +51,12 @@ def test_a_ground_station_sees_a_fleet_at_one_port_and_moves_it_by_its_actions_a
         wait_until(lambda: station.systems == {1, 2, 3}, LIMIT_S, "three vehicles")
         wait_until(lambda: (2, "tasks_open") in station.values, LIMIT_S, "named values")
         assert station.values[2, "tasks_open"] == 6
-        assert any(
-            text.startswith("uav2 flying t") for system, text in station.texts if system == 2
+        wait_until(
+            lambda: any(
+                text.startswith("uav2 flying t") for system, text in station.texts if system == 2
+            ),
+            LIMIT_S,
+            "a text of what it does",
         )
 
         before = dict(station.modes)
