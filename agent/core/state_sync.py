@@ -348,10 +348,8 @@ class StateQueries:
         self._asking = QuestionTimer(timing.ask_gap_s, MOST_OPEN)
         self._ask_s = timing.ask_s
         self._again_at_s: float | None = None
-        self._open = 0
-        """Questions without an answer."""
         self._outdated = 0
-        """Those of them that were asked before the last doubt."""
+        """Questions without an answer that were asked before the last doubt."""
         self._catching_up_since_s: float | None = None
         """Since when it asks because it was held up."""
         self._rests_until_s = -math.inf
@@ -371,7 +369,7 @@ class StateQueries:
 
         ``everyone`` of them, where what each has said meanwhile may have reached nobody else.
         """
-        self.current, self._outdated = False, self._open
+        self.current, self._outdated = False, self._asking.open
         self._everyone |= everyone
         self.want(now_s, of)
 
@@ -388,13 +386,13 @@ class StateQueries:
 
     def take(self, now_s: float, *, enough: bool) -> None:
         """Answers have come; ``enough`` if they are up to date whenever they were asked for."""
-        self._asking.answered()
         self.ever = True
-        self.current |= enough or self._open > self._outdated == 0
+        self.current |= enough or self._asking.open > self._outdated == 0
         if self.current and self._catching_up_since_s is not None:
             self._rests_until_s = now_s + _REST * (now_s - self._catching_up_since_s)
             self._catching_up_since_s = None
-        self._open, self._outdated = max(0, self._open - 1), max(0, self._outdated - 1)
+        self._asking.answered()
+        self._outdated = max(0, self._outdated - 1)
 
     def questions(self, now_s: float, *, lacking: bool, present: Collection[str] = ()) -> list[Ask]:
         """The question that is due, if any; of many who are ``present`` it is for some.
@@ -412,7 +410,6 @@ class StateQueries:
         self._asking.stretch = stretch_of(len(present))
         if not self._asking.due(now_s):
             return []
-        self._open += 1
         if lacking or not self.current:
             self._again_at_s = now_s + self._ask_s
         asked = () if self._everyone else some_of(self._own, present, self._wanted, self._turn)

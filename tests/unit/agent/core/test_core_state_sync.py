@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from agent.core.interface import Action, GoTo, Refused, VehicleReady
+from agent.core.interface import Action
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import (
     Ask,
@@ -477,29 +477,3 @@ def test_its_memory_holds_what_everyone_has_said() -> None:
     assert memory.mission_s == 7.0
     assert {message.writer for message in memory.messages} == {"u0", "u1", COORDINATOR}
     assert memory.messages == tuple(agent.core.replica.messages())
-
-
-# -- what the vehicle refuses -----------------------------------------------------------
-
-
-def test_a_refused_target_is_considered_again_after_a_while_each_time_longer() -> None:
-    agent = LoneAgent(uav("u0"), timing=Timing(silence_s=1e6, pause_s=1e6))
-    agent.fly_to(NEAR)
-    agent.start_mission()
-    refused_at_s, again_s = 0.0, agent.timing.reconsider_s
-    for _ in range(3):
-        (order,) = [o for o in orders(agent.log) if isinstance(o, GoTo) and o.leg == agent.leg]
-        agent.happen(Refused(order, "outside the geofence"), refused_at_s)
-        agent.run_until(refused_at_s + 0.99 * again_s)
-        assert agent.phase is ClaimPhase.IDLE
-        agent.run_until(refused_at_s + again_s + 2.0 * agent.timing.announce_s)
-        assert agent.task == "near"
-        refused_at_s = agent.now_s - ZERO_S
-        again_s *= 2.0
-
-
-def test_ready_again_and_again_is_ready_once() -> None:
-    agent = flying(NEAR)
-
-    assert orders(agent.happen(VehicleReady())) == []
-    assert agent.task == "near"

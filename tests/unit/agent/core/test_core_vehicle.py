@@ -9,6 +9,7 @@ import pytest
 from agent.core.interface import (
     Action,
     Caution,
+    GoTo,
     HandedOver,
     HandOverExplained,
     HeardAgain,
@@ -24,9 +25,10 @@ from agent.core.interface import (
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.protocol.events import LogLine
 from swarm.protocol.messages import CommandKind, OperatorCommand
+from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import ClaimPhase, StatusPhase
 from tests.support.builders import entry, uav
-from tests.support.lone_agent import LoneAgent, claims, finishes, orders, statuses
+from tests.support.lone_agent import ZERO_S, LoneAgent, claims, finishes, orders, statuses
 
 BATTERY = ReturnAdvised("battery at 15%, below the reserve of 20%")
 FENCE = ReturnAdvised("75 m from the origin, outside the fence of 60 m")
@@ -211,3 +213,26 @@ def test_what_people_should_know_of_a_vehicle_is_logged_and_shows_in_flight() ->
 
     agent.happen(Caution(""), 12.0)
     assert statuses(agent.run_until(15.0))[-1].note == ""
+
+
+def test_a_refused_target_is_considered_again_after_a_while_each_time_longer() -> None:
+    agent = LoneAgent(uav("u0"), timing=Timing(silence_s=1e6, pause_s=1e6))
+    agent.fly_to(entry("near", east_m=10.0))
+    agent.start_mission()
+    refused_at_s, again_s = 0.0, agent.timing.reconsider_s
+    for _ in range(3):
+        (order,) = [o for o in orders(agent.log) if isinstance(o, GoTo) and o.leg == agent.leg]
+        agent.happen(Refused(order, "outside the geofence"), refused_at_s)
+        agent.run_until(refused_at_s + 0.99 * again_s)
+        assert agent.phase is ClaimPhase.IDLE
+        agent.run_until(refused_at_s + again_s + 2.0 * agent.timing.announce_s)
+        assert agent.task == "near"
+        refused_at_s = agent.now_s - ZERO_S
+        again_s *= 2.0
+
+
+def test_ready_again_and_again_is_ready_once() -> None:
+    agent = flying()
+
+    assert orders(agent.happen(VehicleReady())) == []
+    assert agent.task == "near"
