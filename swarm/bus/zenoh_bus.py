@@ -25,6 +25,7 @@ from zenoh.handlers import Callback
 
 from swarm.bus.bundled_hearing import GatheredSubscriptions
 from swarm.bus.config import BusConfig, ClientTopology, FileTopology, MeshTopology
+from swarm.bus.own_tokens import OwnTokens
 from swarm.bus.port import (
     Answer,
     Inbox,
@@ -187,9 +188,9 @@ class ZenohBus:
         self._served: set[str] = set()
         self._queryables: dict[str, zenoh.Queryable[None]] = {}
         """By key; the writer's thread alone looks at them."""
-        self._held: set[str] = set()
-        self._tokens: dict[str, zenoh.LivelinessToken | None] = {}
-        """By key, those held now or just now; changed on the writer's thread."""
+        self._tokens: dict[str, zenoh.LivelinessToken] = {}
+        """By key; kept, or they would be undeclared. The writer's thread alone looks at them."""
+        self._own = OwnTokens()
         # A thread that comes back from Zenoh while the interpreter ends aborts the process.
         atexit.register(self.close)
         self._replies: weakref.WeakSet[_Reply] = weakref.WeakSet()
@@ -274,16 +275,13 @@ class ZenohBus:
         """Hold a liveliness token on ``key``."""
         self._check_open()
         check_key(key)
-        if key not in self._held:
-            self._held.add(key)
-            self._tokens.setdefault(key)  # before its word comes back
+        if self._own.hold(key):
             self._call(partial(self._declare_token, key))
 
     def release_token(self, key: str) -> None:
         """Hold the token on ``key`` no longer; see `swarm.bus.shared_seats.SharedBus`."""
         self._check_open()
-        if key in self._held:
-            self._held.discard(key)
+        if self._own.let_go(key):
             self._call(partial(self._undeclare_token, key))
 
     def watch_tokens(self, key_expr: str) -> None:
@@ -387,23 +385,24 @@ class ZenohBus:
         )
 
     def _declare_token(self, key: str) -> None:
-        # Kept, or it would be undeclared when it is collected.
         self._tokens[key] = self._session.liveliness().declare_token(key)
 
     def _undeclare_token(self, key: str) -> None:
-        token = self._tokens[key]
+        token = self._tokens.pop(key, None)
         if token is not None:
             token.undeclare()
-        del self._tokens[key]
-        # Of who else holds it nothing was told as long as this process did.
-        others: list[zenoh.Reply] = []
+        # Until a question has gone to the router and back, this process's token is found itself.
+        self._find_token(key, lambda _: self._call(partial(self._find_others, key)))
 
-        def tell() -> None:
-            event = TokenSeen(key) if others else TokenGone(key)
-            self._inbox.offer_threadsafe(event)
+    def _find_others(self, key: str) -> None:
+        """Tell of who else holds it: nothing was told as long as this process did."""
+        self._own.hear_of_others(key)
+        self._find_token(key, lambda found: self._own.release(key, found, self._tell_token))
 
-        found = Callback(others.append, tell, indirect=False)
-        self._session.liveliness().get(key, found, timeout=REPLY_WITHIN_S)
+    def _find_token(self, key: str, then: Callable[[bool], object]) -> None:
+        found: list[zenoh.Reply] = []
+        ask = Callback(found.append, lambda: then(bool(found)), indirect=False)
+        self._session.liveliness().get(key, ask, timeout=REPLY_WITHIN_S)
 
     def _declare_queryable(self, key: str) -> None:
         on_query = _direct(partial(self._on_query, key))
@@ -422,14 +421,15 @@ class ZenohBus:
             self._inbox.offer_threadsafe(event, latest=how[0])
 
     def _on_token(self, sample: zenoh.Sample) -> None:
-        key = str(sample.key_expr)
-        if key in self._tokens or self._closed:
+        if self._closed:
             return
-        if sample.kind == zenoh.SampleKind.PUT:
-            self._inbox.offer_threadsafe(TokenSeen(key))
-        else:
+        seen = sample.kind == zenoh.SampleKind.PUT
+        if not seen:
             self._links.look()
-            self._inbox.offer_threadsafe(TokenGone(key))
+        self._own.hear(str(sample.key_expr), seen, self._tell_token)
+
+    def _tell_token(self, key: str, seen: bool) -> None:
+        self._inbox.offer_threadsafe(TokenSeen(key) if seen else TokenGone(key))
 
     def _on_query(self, key: str, query: zenoh.Query) -> None:
         reply = _Reply(query, key, self._writer)
