@@ -285,7 +285,9 @@ def test_token_is_gone_when_its_holder_closes(seats: Seats) -> None:
             await reader.until_event(TokenGone("alive/b"))
         c.bus.declare_token("alive/c")
         await a.until_event(TokenSeen("alive/c"))
-        of_b = [event for event in a.events if event in (TokenSeen("alive/b"), TokenGone("alive/b"))]
+        of_b = [
+            event for event in a.events if event in (TokenSeen("alive/b"), TokenGone("alive/b"))
+        ]
         assert of_b == [TokenSeen("alive/b"), TokenGone("alive/b")]
         assert c.of(TokenGone) == [TokenGone("alive/b")]
 
