@@ -12,7 +12,7 @@ what is done with the decision (agent.core.tasking).
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -77,6 +77,31 @@ class DecisionTurn:
     """Height at which it hovers out of its layer over the ground [m]; None: it does not."""
     blocking: Mapping[str, str] = field(default_factory=dict)
     """Lost UAV -> base on whose slot it stands; see `swarm.protocol.bases.blocking`."""
+
+
+def nothing_left(
+    board: TaskBoard, decided_s: float, excluded: Collection[str], counts: Callable[[str], bool]
+) -> bool:
+    """Whether others surely keep all open tasks from a UAV that became free at ``decided_s``.
+
+    True only if `decide` finds nothing, and told without looking at everybody's place: in a large
+    fleet at the end of its mission each claim makes all who are idle ask.
+
+    Args:
+        board: the registers and what they say about tasks.
+        decided_s: mission time [s].
+        excluded: tasks this UAV cannot take.
+        counts: whether that UAV is another one whose claims count.
+    """
+    claimants = board.replica.claimants
+    return all(
+        task in excluded
+        or any(
+            (claim.phase is not ClaimPhase.PROPOSED or claim.decided_s < decided_s) and counts(uav)
+            for uav, claim in claimants.get(task, {}).items()
+        )
+        for task in board.open
+    )
 
 
 def decide(problem: Problem, board: TaskBoard, rule: Rule, turn: DecisionTurn) -> Decision | None:

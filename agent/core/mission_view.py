@@ -254,6 +254,10 @@ class Peers:
         """Others whose claims count."""
         return self.membership.credible - {self._uav}
 
+    def counts(self, uav: str) -> bool:
+        """Whether it is one of them."""
+        return uav != self._uav and self.membership.is_credible(uav)
+
     def heard(self, message: Message, replica: Replica, now_s: float) -> bool:
         """Its writer itself has just said so; whether it is thereby there anew.
 
@@ -293,12 +297,11 @@ class Peers:
 
     def awaited(self, replica: Replica, now_s: float) -> set[str]:
         """Free others that may still be expected to decide in their turn."""
-        credible = self.credible
         return {
             uav
             for uav, claim in replica.claims.items()
-            if uav in credible
-            and _is_free(uav, claim, replica)
+            if _is_free(uav, claim, replica)
+            and self.counts(uav)
             and now_s < self._patience_ends_s(uav)
         }
 

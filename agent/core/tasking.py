@@ -20,6 +20,7 @@ from agent.core.decision import (
     RefusedTasks,
     decide,
     decide_diversion,
+    nothing_left,
 )
 from agent.core.flights import Flights
 from agent.core.interface import FlightLimits
@@ -301,16 +302,19 @@ class Tasking(AgentPart, ABC):
     # -- without one ----------------------------------------------------------------
 
     def _decide(self, now_s: float) -> None:
-        epoch, problem = self._replica.epoch, self._mission_view.board.problem
-        turn = self._turn(self._free.since_s, now_s)
-        if epoch is None or problem is None or turn is None:
+        epoch, board, since_s = self._replica.epoch, self._mission_view.board, self._free.since_s
+        problem = board.problem
+        if epoch is None or problem is None:
             return
-        rule = self._rule_of(epoch)
-        if rule is None:
+        rule, excluded = self._rule_of(epoch), self._refused.left_alone(now_s)
+        if rule is None or nothing_left(board, since_s, excluded, self._peers.counts):
             self._stay_idle(now_s)
             return
+        turn = self._turn(since_s, now_s)
+        if turn is None:
+            return
         recording_rule = RecordingRule(rule, problem.uav_ids.index(self._uav))
-        decision = decide(problem, self._mission_view.board, recording_rule, turn)
+        decision = decide(problem, board, recording_rule, turn)
         if decision is None:
             self._stay_idle(now_s)
         else:
@@ -319,7 +323,7 @@ class Tasking(AgentPart, ABC):
     def _turn(self, free_since_s: float, now_s: float) -> DecisionTurn | None:
         """The turn of this UAV, free since then; None as long as too little is known."""
         place, problem = self._mission_view.place_enu_m, self._mission_view.board.problem
-        if place is None or problem is None or self._uav not in problem.uav_ids:
+        if place is None or problem is None or self._uav not in problem.row_of:
             return None
         return DecisionTurn(
             uav=self._uav,

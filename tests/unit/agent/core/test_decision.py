@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from agent.core.decision import DecisionTurn, decide
+from agent.core.decision import DecisionTurn, decide, nothing_left
 from swarm.allocation.lower_level import TeamState, decisions, rank_of
 from swarm.allocation.problem import Problem
 from swarm.allocation.rules import rule_by_name
@@ -140,6 +140,31 @@ def test_stronger_claims_close_a_task_and_weaker_ones_do_not() -> None:
     ):
         scene = Scene(WEST, MID, EAST).say("u1", claim)
         assert (scene.choice(turn) != "mid") is closed
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_nothing_is_left_only_where_it_decides_for_nothing(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    scene = Scene(WEST, MID)
+    for name in ("u0", "u1", "u2", "u1"):
+        task, at_s = rng.choice(["west", "mid"]), float(rng.integers(2, 5))
+        words = held(task, at_s + 9.0), proposed(task, at_s, int(rng.integers(3))), done(task)
+        scene.say(name, words[rng.choice(3, p=[0.4, 0.4, 0.2])])
+    excluded = {"mid"} if rng.random() < 0.2 else frozenset[str]()
+    credible = NAMES - {"u0"} if rng.random() < 0.8 else {"u2"}
+    turn = replace(TURN, now_s=5.0, decided_s=3.0, excluded=excluded, credible=credible)
+
+    if nothing_left(scene.board, turn.decided_s, excluded, credible.__contains__):
+        assert scene.choice(turn) is None
+
+
+def test_nothing_is_left_where_each_open_task_is_kept_by_somebody_who_counts() -> None:
+    scene = Scene(WEST, MID, EAST).say("u1", held("mid", 99.0)).say("u2", proposed("west", 2.9, 9))
+    assert nothing_left(scene.board, 3.0, {"east"}, {"u1", "u2"}.__contains__)
+    assert not nothing_left(scene.board, 3.0, set(), {"u1", "u2"}.__contains__)
+    assert not nothing_left(scene.board, 3.0, {"east"}, {"u1"}.__contains__)
+    assert not nothing_left(scene.board, 2.9, {"east"}, {"u1", "u2"}.__contains__)
+    assert nothing_left(scene.say("u1", done("east")).board, 3.0, {"mid"}, {"u2"}.__contains__)
 
 
 def test_rank_settles_proposals_of_one_instant() -> None:
