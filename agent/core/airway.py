@@ -47,7 +47,7 @@ from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, adds_nothing
-from swarm.separation.shifted import hovering, landed, left_of_way, lifted, nominal
+from swarm.separation.shifted import continued, hovering, landed, left_of_way, lifted, nominal
 
 _BY_GRANT = GoTo | Return | Prepare
 """Orders that may have to wait for a way."""
@@ -121,7 +121,7 @@ class Airway:
 
     def hear(self, event: Event) -> Event:
         """What the vehicle says, as the core is to hear it: in the layer of the brief."""
-        air = self._shared
+        air = self._fleet.shared
         if air is None:
             return event
         match event:
@@ -148,6 +148,8 @@ class Airway:
                 self._way = replace(landed(self._told_way), heir=heir)
             case Refused(order=GoTo(leg=leg)) if leg == self._flown_leg:
                 self._moves = True
+                if self._wish is not None:
+                    self._stop()
         return event
 
     def recall(self, claim: Claim) -> None:
@@ -184,9 +186,9 @@ class Airway:
         way, self._unplaced = self._told_way, None
         self._rises = isinstance(order, Prepare) and not (self._aloft or way.flies)
         passes = isinstance(order, Prepare) and not self._rises
-        if self._shared is None or not claimed or passes or not isinstance(order, _BY_GRANT):
+        if self._fleet.shared is None or not claimed or passes or not isinstance(order, _BY_GRANT):
             self._actions.append(OrderVehicle(order))
-            if isinstance(order, Hold | Prepare | Swap) and self._shared is not None:
+            if isinstance(order, Hold | Prepare | Swap) and self._fleet.shared is not None:
                 self._stops = False
                 self._drop_wish()
             return
@@ -212,29 +214,36 @@ class Airway:
         own_height |= self._fleet.keeps_height(order, corners[-1])
         high = self._own_height if self._moves else self._at_own_height
         high |= self._fleet.layer.misses(here)
-        wished = order, self._mission_view.now_s, corners, own_height, fixed, high, takes_s
-        self._wish = Wish(*wished)
+        since_s = self._mission_view.now_s
+        self._wish = Wish(order, since_s, corners, own_height, fixed, high, takes_s)
         self._aside = None
         if self._rises:
             self._actions.append(LogLine("asks for the air above its start", {}))
         if not self._aloft:
             self._stand.wait(self._replica.claims.get(self._uav))
         elif self._moves and not self._stops:
-            left = None
-            if self._own_height == own_height and self._vehicle.enu_m is not None:
-                flown = self._told_way, self._vehicle.enu_m
-                left = left_of_way(*flown, corners, self._wish.end_enu_m)
-            if left is None:
-                self._stop()
-            else:
-                self._way = left
-                self._depart(self._wish)
-                self._wish = None
+            self._fly_on(self._wish)
+
+    def _fly_on(self, wish: Wish) -> None:
+        """Fly on if that is as wished, to the end of what is its own at least; else stop."""
+        way, place, corners = self._told_way, self._vehicle.enu_m, wish.corners_enu_m
+        if place is None:
+            return
+        same_end = self._own_height == wish.own_height
+        if same_end and (left := left_of_way(way, place, corners, wish.end_enu_m)) is not None:
+            self._way, self._wish = left, None
+            self._depart(wish)
+            return
+        stays = self._flown_leg != STOP_LEG and not (self._own_height or wish.out_of_layer)
+        if stays and (further := continued(way, place, corners)) is not None:
+            wish.corners_enu_m = further
+        else:
+            self._stop()
 
     @property
     def stop_enu_m(self) -> Point | None:
         """Where the vehicle can be stopped, in the layer of the brief [m]; None: as it tells."""
-        here = self._vehicle.enu_m if self._shared is not None and self._aloft else None
+        here = self._vehicle.enu_m if self._fleet.shared is not None and self._aloft else None
         return None if here is None else self._nominal(here)
 
     def _drop_wish(self) -> None:
@@ -265,6 +274,8 @@ class Airway:
 
     def _arrive(self, way: ClaimedWay) -> None:
         self._moves = False
+        if self._wish is not None and self._flown_leg != STOP_LEG:  # it goes on from here
+            self._wish.since_s = self._mission_view.now_s
         if self._stops and self._stop_enu_m is not None:
             self._stops, place = False, self._stop_enu_m
             shift_m = place[2] - self._nominal(place)[2]
@@ -278,7 +289,7 @@ class Airway:
 
     def told(self, claim: Claim) -> Claim:
         """``claim`` with the air that this UAV takes or asks for."""
-        if self._shared is None:
+        if self._fleet.shared is None:
             return claim
         claim = self._stand.told(claim, self._fleet.mission_s)
         way = self._told_way
@@ -293,7 +304,7 @@ class Airway:
         Returns:
             Orders that are given up, since no way becomes free, or advice to land where it is.
         """
-        air = self._shared
+        air = self._fleet.shared
         if air is None or self._uav not in self._replica.claims or not self._has_changed(now_s):
             return []
         if self._unplaced is not None and not self._vehicle.is_awaited(now_s):
@@ -306,7 +317,7 @@ class Airway:
 
     def concerned(self, writer: str, said: Claim) -> bool:
         """Whether `settle` has something to do once ``writer`` has said so."""
-        air = self._shared
+        air = self._fleet.shared
         if air is None or self._kept.any or self._stops or self._aside is not None:
             return air is not None
         return air.concerns(self._uav, writer, said, self._replica.claims)
@@ -323,7 +334,7 @@ class Airway:
     def restated(self) -> Claim | None:
         """The own claim, if what is to be told of the air has changed since it was said."""
         claim = self._replica.claims.get(self._uav)
-        if self._shared is None or claim is None:
+        if self._fleet.shared is None or claim is None:
             return None
         now = self.told(self._stand.left(claim, self.last_departure.sortie_end_s()))
         if adds_nothing(now.way, claim.way) and (now.base, now.stage) == (claim.base, claim.stage):
@@ -350,7 +361,7 @@ class Airway:
         if self._aside is None and not self._looks_again:
             self._room_at_s = now_s + self._retry_s
             flies = self._moves and self._aloft
-            self._looks_again = self._clear_behind(air) if flies else self._make_room(air, now_s)
+            self._looks_again = self._clear_behind(air) if flies else self._make_room(air)
         if self._moves and self._aloft:
             return []
         wish, battery = self._wish, self.last_departure
@@ -413,7 +424,7 @@ class Airway:
             wish.asked = True
             self._way = asked
 
-    def _make_room(self, air: SharedAir, now_s: float) -> bool:
+    def _make_room(self, air: SharedAir) -> bool:
         """Step aside for who asks for where it hovers, unless it works; whether there is one."""
         here, claims = hovering(self._told_way), self._claims()
         works = self._wish is None and claims[self._uav].phase is not ClaimPhase.IDLE
@@ -421,10 +432,8 @@ class Airway:
             return False
         if not self._fleet.is_in_the_way(air, here, claims, waits=self._wish is not None):
             return False
-        corner = self._nominal(here.path_enu_m[0])
-        if high := self._at_own_height or self._fleet.layer.misses(corner):
-            corner = self._fleet.layer.above(corner)
-        self._aside = Wish(GoTo(STOP_LEG, corner), now_s, (corner,), out_of_layer=high)
+        place = self._nominal(here.path_enu_m[0])
+        self._aside = self._fleet.makes_room(place, own_height=self._at_own_height)
         return True
 
     def _clear_behind(self, air: SharedAir) -> bool:
@@ -469,18 +478,10 @@ class Airway:
         self._way = replace(way, flies=True, grounded=False)
         if wish.is_shorter_than(path):
             self.when_detoured()
-        if isinstance(order, GoTo):
-            self._flown_leg = order.leg
-            sent: GoTo | Return = replace(order, position_enu_m=path[-1], via_enu_m=path[1:-1])
-        else:
-            sent = replace(order, path_enu_m=path[1:-1], via_enu_m=path[-1])
-        self._actions.append(OrderVehicle(sent))
+        self._flown_leg = order.leg if isinstance(order, GoTo) else STOP_LEG
+        self._actions.append(OrderVehicle(wish.along(path)))
 
     # -- pieces -----------------------------------------------------------------------------------
-
-    @property
-    def _shared(self) -> SharedAir | None:
-        return self._fleet.shared
 
     @property
     def _told_way(self) -> ClaimedWay:

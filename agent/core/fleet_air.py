@@ -207,6 +207,14 @@ class FleetAir:
                 fallback = slabs, asked
         return None if fallback is None else FoundWay(fallback[1], is_free=False)
 
+    def makes_room(self, place_enu_m: Point, *, own_height: bool) -> Wish:
+        """What who hovers there, perhaps at the height of a task, wishes to make room [m]."""
+        corner, high = place_enu_m, own_height or self.layer.misses(place_enu_m)
+        if high:
+            corner = self.layer.above(corner)
+        aside = GoTo(STOP_LEG, corner)
+        return Wish(aside, self._mission_view.now_s, (corner,), out_of_layer=high)
+
     def begin_at(self, wish: Wish, place_enu_m: Point) -> None:
         """The UAV, which has made room, waits there for its way [m; in its own layer].
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from agent.core.interface import GoTo, Prepare, Return
 from swarm.protocol.fields import Point
@@ -50,6 +50,15 @@ class Wish:
     def end_enu_m(self) -> Point | None:
         """Where it ends if that keeps its height [m]."""
         return self.corners_enu_m[-1] if self.own_height else None
+
+    def along(self, path_enu_m: tuple[Point, ...]) -> GoTo | Return | Prepare:
+        """The order, to be flown along that path, from where the vehicle is [m]."""
+        via, end = path_enu_m[1:-1], path_enu_m[-1]
+        if isinstance(self.order, GoTo):
+            return replace(self.order, position_enu_m=end, via_enu_m=via)
+        if isinstance(self.order, Return):
+            return replace(self.order, path_enu_m=via, via_enu_m=end)
+        return self.order
 
     def is_shorter_than(self, path_enu_m: Sequence[Point]) -> bool:
         """Whether that path leads a longer way than was reckoned with."""

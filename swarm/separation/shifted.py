@@ -115,5 +115,21 @@ def left_of_way(
     return replace(way, path_enu_m=left) if is_same_path(left, path) else None
 
 
+def continued(
+    way: ClaimedWay, place_enu_m: Point, corners_enu_m: Sequence[Point]
+) -> tuple[Point, ...] | None:
+    """What a way that is wished adds to one that is flown, if it begins with that; None if not.
+
+    Args:
+        way: on which the UAV is, in its layer to the end.
+        place_enu_m: where.
+        corners_enu_m: of the way that is wished, in its own layer, from there on.
+    """
+    n_left = len(not_flown(way.path_enu_m, place_enu_m))
+    if left_of_way(way, place_enu_m, corners_enu_m[:n_left], None) is None:
+        return None
+    return tuple(corners_enu_m[n_left - 1 :])
+
+
 def _above(one_enu_m: Point, other_enu_m: Point) -> bool:
     return math.dist(one_enu_m[:2], other_enu_m[:2]) <= _NEAR_M

@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 
 from agent.core.fleet_air import STOP_LEG
-from agent.core.interface import Arrived, GoTo, Return
+from agent.core.interface import Arrived, GoTo, Refused, Return
 from agent.core.last_departure import LEAVES_ZONE_S
 from agent.core.states import AgentState
 from swarm.protocol.events import LinkChanged
 from swarm.protocol.fields import Point
-from swarm.protocol.messages import TaskEntry
+from swarm.protocol.messages import CommandKind, TaskEntry
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from tests.support.builders import entry
 from tests.support.field_agent import FAR_BASE, FieldAgent, Script, square
@@ -177,3 +177,46 @@ def test_who_flies_round_a_zone_goes_on_round_where_it_was_once_that_is_gone(
 
     agent.drawn(square("between", 60.0, 0.0), 22.0)
     assert fleet.flights(before)[0].leg == STOP_LEG
+
+
+def sent_home_in_a_zone() -> tuple[Fleet, GoTo, int]:
+    """It is told to fly home just before it is out of a zone, by where it leaves that.
+
+    Also gives where it is sent first, and how often it has been sent anywhere since.
+    """
+    fleet = Fleet()
+    agent = fleet.agent
+    agent.happen(LinkChanged(False), 1.0)
+    agent.happen(LinkChanged(True), 9.0)
+    agent.be_at((-6.0, 0.0, 10.0), None, 9.0)
+    agent.drawn(OVER, 9.1)
+    out, since = agent.flight, len(orders(agent.log))
+    agent.be_at((-7.0, 0.0, out.position_enu_m[2]), None, 10.0)
+    agent.told(CommandKind.RETURN, 10.0)
+    return fleet, out, since
+
+
+def test_who_is_sent_on_from_where_it_flies_to_flies_there_and_asks_there() -> None:
+    fleet, out, since = sent_home_in_a_zone()
+    agent = fleet.agent
+    assert orders(agent.log)[since:] == []
+
+    agent.be_at(out.position_enu_m, None, 11.0)
+    agent.happen(Arrived(out.leg))
+    agent.run_until(12.0)
+
+    (home,) = orders(agent.log)[since:]
+    assert isinstance(home, Return)
+    claim = agent.core.replica.claims["u0"]
+    assert claim.way is not None
+    assert claim.way.path_enu_m[0][0] == pytest.approx(-8.0, abs=0.01)
+
+
+def test_who_may_not_fly_there_after_all_stops_to_ask() -> None:
+    fleet, out, since = sent_home_in_a_zone()
+
+    fleet.agent.happen(Refused(out, "not now"))
+
+    (stopped,) = fleet.flights(since)
+    assert stopped.leg == STOP_LEG
+    assert stopped.position_enu_m[0] == -7.0
