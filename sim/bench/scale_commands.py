@@ -135,8 +135,9 @@ def _warn_of_large(settings: ScaleSettings) -> None:
     """Say which fleets this machine is too small for, before anything starts."""
     from sim.fleet.capacity import memory_bytes, too_large, usable_cores
 
-    cores, room_bytes = usable_cores(), memory_bytes()
+    room, per_process = (usable_cores(), memory_bytes()), settings.agents_per_process
+    apart = settings.separation_m is not None
     for n_uav in settings.sizes:
-        reason = too_large(n_uav, cores, room_bytes, settings.agents_per_process)
+        reason = too_large(n_uav, *room, per_process, keeps_apart=apart)
         if reason is not None:
             typer.echo(f"warning: {reason}", err=True)

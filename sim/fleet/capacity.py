@@ -14,6 +14,10 @@ CPU_FRAC_PER_UAV: Final = 0.0135
 its simulated autopilot (0.17 %), what router, coordinator and launcher do for it (0.1 %)."""
 CPU_FRAC_SHARED: Final = 0.0075
 """The same where `MANY` agents share a process: 0.5 % for each of them."""
+CPU_FRAC_APART: Final = 0.063
+"""The same of an agent with a process of its own that keeps a separation: 30 of them take 1.9."""
+CPU_FRAC_APART_SHARED: Final = 0.0195
+"""And where they share processes: 100 of them take all of two processors, and none is lost."""
 MANY: Final = 10
 BYTES_PER_UAV: Final = 45 * 10**6
 """Of an agent (26 MB) and an autopilot of its own (18 MB), shares of common pages included."""
@@ -36,20 +40,41 @@ def memory_bytes() -> int:
         return 0
 
 
-def too_large(n_uav: int, cores: int, memory_bytes: int, agents_per_process: int = 1) -> str | None:
+def cpu_frac(agents_per_process: int = 1, *, keeps_apart: bool = False) -> float:
+    """What each UAV takes of one processor.
+
+    Args:
+        agents_per_process: how many agents share a process; counted as alone, or as dozens.
+        keeps_apart: whether they keep a separation.
+    """
+    if agents_per_process < MANY:
+        return CPU_FRAC_APART if keeps_apart else CPU_FRAC_PER_UAV
+    return CPU_FRAC_APART_SHARED if keeps_apart else CPU_FRAC_SHARED
+
+
+def too_large(
+    n_uav: int,
+    cores: int,
+    memory_bytes: int,
+    agents_per_process: int = 1,
+    *,
+    keeps_apart: bool = False,
+) -> str | None:
     """Why that machine cannot fly so many UAVs; None if it can, for all that is known.
 
     Args:
         n_uav: size of the fleet.
         cores: processors that may be used.
         memory_bytes: RAM; 0 when unknown.
-        agents_per_process: how many agents share a process; counted as alone, or as dozens.
+        agents_per_process: see `cpu_frac`.
+        keeps_apart: see `cpu_frac`.
     """
-    by_cores = int(cores / (CPU_FRAC_PER_UAV if agents_per_process < MANY else CPU_FRAC_SHARED))
+    by_cores = int(cores / cpu_frac(agents_per_process, keeps_apart=keeps_apart))
     by_memory = int(max(0, memory_bytes - BYTES_BESIDES) / BYTES_PER_UAV)
     if n_uav > by_cores:
         has = "1 core" if cores == 1 else f"{cores} cores"
-        return f"{n_uav} UAVs, and {has} can fly about {by_cores}"
+        which = " that keep apart" if keeps_apart else ""
+        return f"{n_uav} UAVs{which}, and {has} can fly about {by_cores}"
     if memory_bytes and n_uav > by_memory:
         gib = memory_bytes / 2**30
         return f"{n_uav} UAVs, and {gib:.1f} GiB of memory have room for about {by_memory}"

@@ -316,7 +316,7 @@ def run(
     autopilots = parse_autopilots(autopilot, uavs, firmware, os.environ, kinds_of(mission))
     check_speedup(autopilots, speedup)
     if isinstance(autopilots, SimulatedAutopilots) and not any_size:
-        _check_size(scenario, len(uavs), agents_per_process)
+        _check_size(scenario, mission, agents_per_process)
     if agents_per_process > 1:
         _check_sharing(autopilots, bus, secure=secure or keys is not None)
     passthrough = PassthroughOptions(
@@ -393,16 +393,17 @@ def _check_sharing(autopilots: Autopilots, bus: str, *, secure: bool) -> None:
         raise InputError(Fault("--agents-per-process", "", problem, "leave it out"))
 
 
-def _check_size(scenario: Path, n_uav: int, agents_per_process: int) -> None:
+def _check_size(scenario: Path, mission: Mission, agents_per_process: int) -> None:
     """Refuse a fleet that this machine cannot fly, before anything starts."""
     from sim.fleet.capacity import MANY, memory_bytes, too_large, usable_cores
     from sim.fleet.layout import VEHICLES_PER_PROCESS
 
-    cores, room_bytes = usable_cores(), memory_bytes()
-    reason = too_large(n_uav, cores, room_bytes, agents_per_process)
+    machine = len(mission.uavs), usable_cores(), memory_bytes()
+    apart = mission.separation_m is not None
+    reason = too_large(*machine, agents_per_process, keeps_apart=apart)
     if reason is None:
         return
-    shared = too_large(n_uav, cores, room_bytes, MANY) is None
+    shared = too_large(*machine, MANY, keeps_apart=apart) is None
     way = f"let UAVs share processes with --agents-per-process {VEHICLES_PER_PROCESS}"
     way = way if shared else "fly it on several machines (deploy/README.md)"
     remedy = f"{way}, or all the same with --any-size"

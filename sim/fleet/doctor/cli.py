@@ -123,7 +123,9 @@ def doctor(
         if scenario is not None:
             flown, findings = check_scenario(scenario)
             yield findings
-        yield check_limits(read_limits(), len(flown.uavs) if flown else _DEFAULT_UAVS)
+        n_uav = len(flown.uavs) if flown else _DEFAULT_UAVS
+        apart = flown is not None and flown.separation_m is not None
+        yield check_limits(read_limits(), n_uav, keeps_apart=apart)
         if state is not None:
             yield [check_state(read_folder(state))]
         for each in port or ():

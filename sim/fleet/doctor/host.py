@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from sim.fleet.capacity import BYTES_PER_UAV, CPU_FRAC_PER_UAV
+from sim.fleet.capacity import BYTES_PER_UAV, cpu_frac
 from sim.fleet.doctor.finding import CheckFinding, fails, fine, warns
 
 _LONGEST_AGE_S = 20 * 365.25 * 86_400.0
@@ -77,7 +77,9 @@ class ResourceLimits:
     """Free memory; None if that cannot be told."""
 
 
-def check_limits(limits: ResourceLimits, uavs: int) -> list[CheckFinding]:
+def check_limits(
+    limits: ResourceLimits, uavs: int, *, keeps_apart: bool = False
+) -> list[CheckFinding]:
     """Whether agents and simulated autopilots of that many UAVs can run here together."""
     findings = []
     fleet = f"{uavs} UAV{'s'[: uavs - 1]}"
@@ -88,7 +90,7 @@ def check_limits(limits: ResourceLimits, uavs: int) -> list[CheckFinding]:
     else:
         findings.append(fine("open files", f"{limits.open_files} allowed, enough for {fleet}"))
     cpus = f"{limits.cpus} processor{'s'[: limits.cpus - 1]}"
-    if uavs > limits.cpus / CPU_FRAC_PER_UAV:
+    if uavs > limits.cpus / cpu_frac(keeps_apart=keeps_apart):
         remedy = "fly at a lower --speedup, or spread agents over machines"
         findings.append(warns("processors", f"{cpus} are few for {fleet}", remedy))
     else:

@@ -136,6 +136,12 @@ def test_a_machine_is_judged_by_the_fleet_it_is_to_carry() -> None:
         CheckState.WARNING,
         CheckState.WARNING,
     ]
+    assert states(*check_limits(small, 20)) == [CheckState.OK] * 3
+    assert states(*check_limits(small, 20, keeps_apart=True)) == [
+        CheckState.OK,
+        CheckState.WARNING,
+        CheckState.OK,
+    ]
     assert "ulimit -n 1088" in check_limits(small, 120)[0].remedy
     assert len(check_limits(replace(small, memory_bytes=None), 1)) == 2
 
