@@ -40,6 +40,7 @@ from agent.core.interface import (
 from agent.core.kept_air import KeptAir
 from agent.core.mission_view import MissionView, Peers
 from agent.core.place_on_way import PlaceOnWay
+from agent.core.stop_on_way import StopOnWay
 from agent.core.wish import Wish
 from swarm.protocol.events import LogLine
 from swarm.protocol.fields import Point
@@ -78,10 +79,9 @@ class Airway:
         self.last_departure = self._fleet.last_departure
         """What the battery allows."""
         self._way: ClaimedWay | None = None
-        self._aloft = self._moves = self._stops = False
-        """Whether the vehicle may be anywhere on its way, and has been told to stop on it."""
-        self._stop_enu_m: Point | None = None
-        """Where, for the wish to be asked from there."""
+        self._aloft = self._moves = False
+        """Whether the vehicle is in the air, and may be anywhere on its way."""
+        self._halt = StopOnWay(timing.patience_s)
         self._own_height = False
         """Whether its way ends at the height of a task."""
         self._at_own_height = False
@@ -139,17 +139,18 @@ class Airway:
             case Arrived(leg=leg) if leg == self._flown_leg:
                 self._arrive(self._told_way)
             case Held():
-                self._moves, self._stops = self._aloft, False  # it is somewhere on its way
+                self._moves = self._aloft  # it is somewhere on its way
+                self._halt.end()
             case Landed() | Home():
-                self._aloft = self._moves = self._stops = False
+                self._aloft = self._moves = False
+                self._halt.end()
                 self._lifts_enu_m = None
                 self._vehicle.land()
                 heir = self._fleet.heir(air) if isinstance(event, Home) else None
                 self._way = replace(landed(self._told_way), heir=heir)
             case Refused(order=GoTo(leg=leg)) if leg == self._flown_leg:
                 self._moves = True
-                if self._wish is not None:
-                    self._stop()
+                self._halt.refused(self._mission_view.now_s)
         return event
 
     def recall(self, claim: Claim) -> None:
@@ -189,7 +190,7 @@ class Airway:
         if self._fleet.shared is None or not claimed or passes or not isinstance(order, _BY_GRANT):
             self._actions.append(OrderVehicle(order))
             if isinstance(order, Hold | Prepare | Swap) and self._fleet.shared is not None:
-                self._stops = False
+                self._halt.end()
                 self._drop_wish()
             return
         here = self._fleet.rises_at_enu_m if self._rises else self._here()
@@ -221,7 +222,7 @@ class Airway:
             self._actions.append(LogLine("asks for the air above its start", {}))
         if not self._aloft:
             self._stand.wait(self._replica.claims.get(self._uav))
-        elif self._moves and not self._stops:
+        elif self._moves and not self._halt.under_way:
             self._fly_on(self._wish)
 
     def _fly_on(self, wish: Wish) -> None:
@@ -267,17 +268,15 @@ class Airway:
 
     def _stop(self) -> None:
         """Stop where the vehicle was told to be last, which is on its way."""
-        if self._vehicle.enu_m is None:
-            return
-        self._stops, self._flown_leg, self._stop_enu_m = True, STOP_LEG, self._vehicle.enu_m
-        self._actions.append(OrderVehicle(GoTo(STOP_LEG, self._vehicle.enu_m)))
+        if self._vehicle.enu_m is not None:
+            self._flown_leg = STOP_LEG
+            self._actions.append(OrderVehicle(self._halt.begin(self._vehicle.enu_m)))
 
     def _arrive(self, way: ClaimedWay) -> None:
         self._moves = False
         if self._wish is not None and self._flown_leg != STOP_LEG:  # it goes on from here
             self._wish.since_s = self._mission_view.now_s
-        if self._stops and self._stop_enu_m is not None:
-            self._stops, place = False, self._stop_enu_m
+        if (place := self._halt.end()) is not None:
             shift_m = place[2] - self._nominal(place)[2]
             self._way = replace(way, path_enu_m=(place,), shift_m=shift_m)
         elif way.flies and way.path_enu_m:  # what is only asked for begins where it hovers
@@ -299,10 +298,9 @@ class Airway:
         return claim if claim.way is whole else replace(claim, way=whole)
 
     def settle(self, now_s: float) -> Sequence[Refused | ReturnAdvised]:
-        """What follows from the claims: whom to grant, where to go, and what is told of it.
+        """What follows from the claims: whom to grant, and where to go.
 
-        Returns:
-            Orders that are given up, since no way becomes free, or advice to land where it is.
+        Gives orders that are given up, since no way becomes free, or advice to land where it is.
         """
         air = self._fleet.shared
         if air is None or self._uav not in self._replica.claims or not self._has_changed(now_s):
@@ -318,14 +316,14 @@ class Airway:
     def concerned(self, writer: str, said: Claim) -> bool:
         """Whether `settle` has something to do once ``writer`` has said so."""
         air = self._fleet.shared
-        if air is None or self._kept.any or self._stops or self._aside is not None:
+        if air is None or self._kept.any or self._halt.under_way or self._aside is not None:
             return air is not None
         return air.concerns(self._uav, writer, said, self._replica.claims)
 
     def _has_changed(self, now_s: float) -> bool:
         """Whether anything is new since the last look: most steps are about something else."""
         due_s = self.next_deadline_s()
-        told = (self._way, self._wish, self._aside, self._stops, self._moves, self._aloft)
+        told = (self._way, self._wish, self._aside, self._halt.under_way, self._moves, self._aloft)
         placed = self._vehicle.enu_m is not None
         now = (*self._replica.claims.values(), *told, placed, len(self._fleet.heard()))
         before, self._settled = self._settled, now
@@ -346,8 +344,8 @@ class Airway:
         wish = self._aside or self._wish
         if self._unplaced is not None:
             return self._vehicle.awaited_until_s
-        if self._stops:
-            return None
+        if self._halt.under_way or self._halt.again_s is not None:
+            return self._halt.again_s
         again_s = self._room_at_s if self._looks_again else None
         return again_s if wish is None or (self._moves and self._aloft) else wish.retry_at_s
 
@@ -355,7 +353,9 @@ class Airway:
 
     def _press(self, air: SharedAir, now_s: float) -> Sequence[Refused | ReturnAdvised]:
         """Ask for what is wished, give way to who is stronger, make room, or give up."""
-        if self._stops:
+        if self._halt.is_due(now_s) and self._wish is not None and self._moves and self._aloft:
+            self._stop()
+        if self._halt.under_way:
             return []
         self._looks_again = self._aside is None and self._room_at_s > now_s
         if self._aside is None and not self._looks_again:
@@ -451,7 +451,7 @@ class Airway:
 
     def _depart_if_granted(self, air: SharedAir, now_s: float) -> None:
         wish, way = self._aside or self._wish, self._told_way
-        if wish is None or not wish.asked or way.flies or self._stops:
+        if wish is None or not wish.asked or way.flies or self._halt.under_way:
             return
         if air.is_granted(self._uav, self._claims(), self._fleet.expired()):
             if way.path_enu_m:

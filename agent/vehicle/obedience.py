@@ -243,7 +243,7 @@ def _must_stand_first(activity: Activity, order: GoTo, session: VehicleSession) 
     lead through.
     """
     mission, heartbeat, firmware = session.mission, session.vehicle.heartbeat, session.firmware
-    if session.slides_into_zone():
+    if session.slides_into_zone() and not _stops_in_zone(order, session):
         return True
     if mission is None or heartbeat is None or firmware is None or isinstance(activity, Holding):
         return False
@@ -255,9 +255,15 @@ def _must_stand_first(activity: Activity, order: GoTo, session: VehicleSession) 
 
 def _way_fault(order: GoTo, session: VehicleSession) -> str | None:
     """Why the way there must not be flown, in words; None if it may be."""
+    if _stops_in_zone(order, session):
+        return None
     way_enu_m = (*order.via_enu_m, order.position_enu_m)
     faults = (session.config.out_of_bounds(corner) for corner in order.via_enu_m)
     return next(filter(None, faults), None) or session.way_objection(way_enu_m)
+
+
+def _stops_in_zone(order: GoTo, session: VehicleSession) -> bool:
+    return not order.via_enu_m and session.stops_in_zone(order.position_enu_m)
 
 
 def _depart(standing: Standing, order: GoTo, session: VehicleSession) -> Activity:

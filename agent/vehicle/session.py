@@ -94,6 +94,10 @@ _HEEDS_S = 2.0
 """So late at most a vehicle begins to brake for a zone that is new: news of it, the order and the
 place that it tells take their time."""
 
+_JUST_NOW_S = 1.0
+"""So long ago a vehicle may have been where it is told to stop [s]."""
+_BESIDE_M = 2.0
+"""And so much farther off [m]."""
 _BRAKES_S = 60.0
 """No vehicle brakes for longer, whatever acceleration is told of it."""
 
@@ -288,6 +292,17 @@ class VehicleSession(Conversation):
         home_up_m = home_alt_m - self.config.origin.alt_m
         fence.advance(self._braking_way_m(_HEEDS_S), home_up_m, may_begin=free)
         return fence.objection
+
+    def stops_in_zone(self, place_enu_m: Point) -> bool:
+        """Whether it is in a zone, and that is where it is, or was just now [m].
+
+        To stop is better there than to fly on.
+        """
+        here_enu_m, position = self.known_place_m(), self.vehicle.position
+        if here_enu_m is None or position is None or not self.guard.inside(here_enu_m):
+            return False
+        flown_m = _JUST_NOW_S * math.hypot(*position.velocity_enu_m_s)
+        return math.dist(here_enu_m, place_enu_m) <= _BESIDE_M + flown_m
 
     def slides_into_zone(self) -> bool:
         """Whether it is too fast to stop outside of zones."""

@@ -14,8 +14,10 @@ from dataclasses import replace
 
 from swarm.protocol.fields import Point
 from swarm.protocol.uav_messages import ClaimedWay
-from swarm.separation.straight_pieces import is_same_path, not_flown
+from swarm.separation.straight_pieces import is_same_path, not_flown, off_piece_m
 
+_ON_LINE_M = 0.1
+"""A way that is wished leads through where one ends that passes that by no more [m]."""
 _NEAR_M = 0.01
 """Who is no farther from a place, seen from above, is above or below it [m]."""
 
@@ -125,10 +127,15 @@ def continued(
         place_enu_m: where.
         corners_enu_m: of the way that is wished, in its own layer, from there on.
     """
-    n_left = len(not_flown(way.path_enu_m, place_enu_m))
-    if left_of_way(way, place_enu_m, corners_enu_m[:n_left], None) is None:
+    left = not_flown(way.path_enu_m, place_enu_m)
+    path = shifted_path(place_enu_m, corners_enu_m, way.shift_m)
+    n_same = len(left) - 1
+    if n_same < 1 or len(path) <= n_same or not is_same_path(left[:-1], path[:n_same]):
         return None
-    return tuple(corners_enu_m[n_left - 1 :])
+    if off_piece_m(left[-1], path[n_same - 1], path[n_same]) > _ON_LINE_M:
+        return None
+    further = [point for point in path[n_same:] if math.dist(point, left[-1]) > _NEAR_M]
+    return tuple((east, north, up - way.shift_m) for east, north, up in (left[-1], *further))
 
 
 def _above(one_enu_m: Point, other_enu_m: Point) -> bool:

@@ -216,7 +216,30 @@ def test_who_may_not_fly_there_after_all_stops_to_ask() -> None:
     fleet, out, since = sent_home_in_a_zone()
 
     fleet.agent.happen(Refused(out, "not now"))
+    fleet.agent.run_until(10.0 + SOON_S)
 
     (stopped,) = fleet.flights(since)
     assert stopped.leg == STOP_LEG
     assert stopped.position_enu_m[0] == -7.0
+
+
+def test_who_may_not_stop_is_told_again_where_it_has_come_to_and_not_at_once() -> None:
+    fleet = Fleet(entry("t0", 100.0))
+    agent = fleet.agent
+    agent.be_at((40.0, 0.0, 10.0), None, 40.0)
+    agent.told(CommandKind.RETURN, 40.0)
+    stop, since = agent.flight, len(orders(agent.log))
+    assert (stop.leg, stop.position_enu_m[0]) == (STOP_LEG, 40.0)
+
+    for east_m, refused in ((42.0, stop), (44.0, GoTo(STOP_LEG, (42.0, 0.0, 10.0)))):
+        agent.happen(Refused(refused, "not here"))
+        assert fleet.flights(since) == []
+        agent.be_at((east_m, 0.0, 10.0), None, east_m)
+        agent.run_until(east_m + SOON_S)
+        (again,) = fleet.flights(since)
+        assert (again.leg, again.position_enu_m[0]) == (STOP_LEG, east_m)
+        since = len(orders(agent.log))
+
+    agent.happen(Arrived(STOP_LEG))
+    agent.run_until(46.0)
+    assert isinstance(agent.last_order, Return)

@@ -16,6 +16,9 @@ from tests.support.bridge_flight import BEHIND, ORIGIN, ROUND, WALL, BridgeFligh
 from tests.support.fake_copter import SET_MODE, FakeCopter
 from tests.support.fake_px4 import FakePx4
 
+SQUARE = ((-15.0, -15.0), (15.0, -15.0), (15.0, 15.0), (-15.0, 15.0))
+"""Corners of a zone around a place [m]."""
+
 
 @pytest.fixture
 def flight(flight: BridgeFlight) -> BridgeFlight:
@@ -99,6 +102,35 @@ def test_a_zone_drawn_round_it_is_left_by_a_short_way_only(flight: BridgeFlight)
     assert flight.order(across)[-1] == Refused(across, "zone new lies in the way")
     flight.order(GoTo(2, (-5.0, 0.0, 10.0)))
     flight.run_until(Arrived(2), limit_s=60.0)
+
+
+def test_in_a_zone_drawn_over_it_a_vehicle_may_stop_where_it_is_and_nowhere_else(
+    flight: BridgeFlight,
+) -> None:
+    flight.order(GoTo(1, (60.0, 40.0, 10.0)))
+    flight.run(5.0)
+    here = flight.telemetry[-1].position_enu_m
+    around = Zone(ZoneId("new"), tuple((here[0] + e, here[1] + n) for e, n in SQUARE))
+    flight.order(KeepOut((around,), 0.0))
+    farther = GoTo(2, (here[0] + 8.0, here[1], here[2]))
+    assert flight.order(farther)[-1] == Refused(farther, "zone new lies in the way")
+
+    stop = GoTo(3, here)
+    assert Refused(stop, "zone new lies in the way") not in flight.order(stop)
+    flight.run_until(Arrived(3), limit_s=30.0)
+
+    assert math.dist(flight.telemetry[-1].position_enu_m, here) <= 1.0
+    nearer = GoTo(4, (here[0] + 2.5, here[1], here[2]))
+    assert flight.order(nearer)[-1] == Refused(nearer, "zone new lies in the way")
+
+
+def test_who_hovers_beside_a_zone_is_not_let_into_it(flight: BridgeFlight) -> None:
+    here = flight.telemetry[-1].position_enu_m
+    beside = Zone(ZoneId("new"), tuple((here[0] + 16.0 + e, here[1] + n) for e, n in SQUARE))
+    flight.order(KeepOut((beside,), 0.0))
+    order = GoTo(1, (here[0] + 1.9, here[1], here[2]))
+
+    assert flight.order(order)[-1] == Refused(order, "zone new lies in the way")
 
 
 def test_a_path_is_replaced_by_another_in_the_middle_of_it(flight: BridgeFlight) -> None:

@@ -19,6 +19,7 @@ BEGINS, ENDS, ON = (20.0, 0.0, 30.0), (50.0, 0.0, 30.0), (50.0, 60.0, 30.0)
 def test_what_goes_on_where_a_way_ends_begins_there() -> None:
     assert continued(FLOWN, HERE, (BEGINS, ENDS, ON, BEGINS)) == (ENDS, ON, BEGINS)
     assert continued(FLOWN, HERE, (BEGINS, ENDS)) == (ENDS,)
+    assert continued(FLOWN, HERE, (BEGINS, (60.0, 0.0, 30.0), ON)) == (ENDS, (60.0, 0.0, 30.0), ON)
 
 
 @pytest.mark.parametrize(
@@ -26,7 +27,7 @@ def test_what_goes_on_where_a_way_ends_begins_there() -> None:
     [
         pytest.param((BEGINS, ON), id="past its end"),
         pytest.param((BEGINS, (40.0, 0.0, 30.0), ON), id="from before its end"),
-        pytest.param((BEGINS, (60.0, 0.0, 30.0), ON), id="beyond its end"),
+        pytest.param((BEGINS, (60.0, 1.0, 30.0), ON), id="beside its end"),
         pytest.param((BEGINS, (50.0, 0.0, 32.0), ON), id="in another layer"),
         pytest.param((BEGINS,), id="from here"),
     ],
