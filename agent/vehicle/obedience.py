@@ -86,6 +86,7 @@ def obey(activity: Activity, order: VehicleOrder, session: VehicleSession) -> Ac
     """Carry an order out, or refuse it."""
     if isinstance(order, Prepare | Swap | Hold | Return):
         set_pace(session, None)
+        session.comes_back_into_zone = False
     match order:
         case GiveWay():
             return give_way(activity, order, session)
@@ -177,6 +178,7 @@ def go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
         )
     if isinstance(activity, Holding):
         session.commands.cancel_all()
+    session.comes_back_into_zone = _stops_in_zone(order, session)
     flying = Flying(session, session.firmware, order)
     session.sent_to_enu_m.append(order.position_enu_m)
     flying.start()

@@ -148,6 +148,9 @@ class VehicleSession(Conversation):
         self.cruise_watch = CruiseWatch()
         self.place_enu_m = (math.nan, math.nan, math.nan)
         """Where the vehicle is, by its newest position [m; mission origin]."""
+        self.comes_back_into_zone = False
+        """Whether it stops in a zone, and may be out of that for a while before: it has no fence of
+        it yet, which it would flee from."""
         self.sent_to_enu_m: deque[Point] = deque(maxlen=_PLACES)
         """Where the vehicle was last told to fly: of the newest it may not have heard."""
 
@@ -290,7 +293,8 @@ class VehicleSession(Conversation):
         home_alt_m = 0.0 if position is None else position.alt_m - position.relative_alt_m
         free = self.mission is None or not self.mission.is_transferring
         home_up_m = home_alt_m - self.config.origin.alt_m
-        fence.advance(self._braking_way_m(_HEEDS_S), home_up_m, may_begin=free)
+        way_m = None if self.comes_back_into_zone else self._braking_way_m(_HEEDS_S)
+        fence.advance(way_m, home_up_m, may_begin=free)
         return fence.objection
 
     def stops_in_zone(self, place_enu_m: Point) -> bool:

@@ -6,6 +6,7 @@ Its bridge refuses what virtual vehicles fly: no way that stays in a zone is com
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import pytest
@@ -18,7 +19,7 @@ from sim.autopilot.firmware import FirmwareModelName
 from swarm.model import Zone
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import CommandKind
-from tests.support.bridged_crossings import LOOK_S, CrossingFleet, mission_of
+from tests.support.bridged_crossings import LOOK_S, CrossingFleet, Roughness, mission_of, roughly
 from tests.support.bridged_fleet import ONE_DIAGONAL, OTHER_DIAGONAL
 
 BESIDE_EACH_OTHER = replace(
@@ -31,6 +32,9 @@ CORNERS = ((-18.0, -20.0), (18.0, -20.0), (18.0, 20.0), (-18.0, 20.0))
 DRAWN_BY_S = 120.0
 LEAVES_S = 12.0
 """It has stopped by then, and is out of the zone, by 20 m at most."""
+COMES_BACK_S = 40.0
+"""As much for one that brakes for 20 m, and comes back so far."""
+UAVS = BESIDE_EACH_OTHER.uavs
 
 
 class ZonedFleet(CrossingFleet):
@@ -38,6 +42,8 @@ class ZonedFleet(CrossingFleet):
 
     Args:
         sent_home: whether the operator sends that one home while it leaves the zone.
+        rough: what is less than ideal; None: nothing, and vehicles stop at once.
+        corners: of the zone, from where the UAV is [m].
     """
 
     def __init__(
@@ -47,9 +53,12 @@ class ZonedFleet(CrossingFleet):
         style: CommandStyle,
         *,
         sent_home: bool,
+        rough: Roughness | None = None,
+        corners: Sequence[tuple[float, float]] = CORNERS,
     ) -> None:
-        super().__init__(monkeypatch, flavour, style, BESIDE_EACH_OTHER, planned=True)
-        self._sent_home = sent_home
+        mission = BESIDE_EACH_OTHER if rough is None else rough.mission
+        super().__init__(monkeypatch, flavour, style, mission, planned=True, rough=rough)
+        self._sent_home, self._corners = sent_home, corners
         self._zone: Zone | None = None
         self._drawn_s = self._inside_s = math.inf
         self.at(LOOK_S, self._look_at_zone)
@@ -70,7 +79,7 @@ class ZonedFleet(CrossingFleet):
             self.at(now_s + LOOK_S, self._look_at_zone)
 
     def _draw(self, now_s: float, place_m: Point) -> None:
-        corners = tuple((place_m[0] + east, place_m[1] + north) for east, north in CORNERS)
+        corners = tuple((place_m[0] + east, place_m[1] + north) for east, north in self._corners)
         drawn = NewZone("over", corners)
         self._zone, self._drawn_s = drawn.spec(None).zone(), now_s
         self.world.operate(drawn)
@@ -104,3 +113,26 @@ def test_who_flies_leaves_it_and_does_its_task(
     fleet.assert_all_done()
     assert fleet.books["u0"].reasons(Refused) == []
     assert 0.0 < fleet.left_after_s < LEAVES_S, fleet.left_after_s
+
+
+@ONE_DIAGONAL
+def test_who_stops_in_a_zone_that_it_has_shot_out_of_is_not_driven_off_by_its_own_fence(
+    flavour: FirmwareModelName, style: CommandStyle, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It brakes for 20 m and comes back; a fence that was put on it meanwhile would be breached."""
+    slow = roughly(acceleration_m_s2=1.6)
+    rough = Roughness(
+        replace(BESIDE_EACH_OTHER, uavs=tuple(replace(u, acceleration_m_s2=1.6) for u in UAVS)),
+        {str(u.id): slow for u in UAVS},
+        {},
+        0.0,
+        (),
+        frozenset(),
+    )
+    small = ((-30.0, -12.0), (14.0, -12.0), (14.0, 12.0), (-30.0, 12.0))
+    fleet = ZonedFleet(monkeypatch, flavour, style, sent_home=False, rough=rough, corners=small)
+
+    fleet.fly()
+
+    fleet.assert_all_done()
+    assert 0.0 < fleet.left_after_s < COMES_BACK_S, fleet.left_after_s

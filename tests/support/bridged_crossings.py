@@ -188,9 +188,7 @@ def roughness(mission: Mission, seed: int, *, planned: bool) -> Roughness:
         east, north, up = (off_m[uav.id] * way / np.linalg.norm(way)).tolist()
         air = Wind((wind_m_s[0], wind_m_s[1]), gusts_of(gust_m_s, rng) if gust_m_s > 0.5 else None)
         uavs.append(replace(uav, acceleration_m_s2=acceleration_m_s2))
-        change[uav.id] = partial(
-            _roughly, acceleration_m_s2=acceleration_m_s2, error_m=(east, north, up), wind=air
-        )
+        change[uav.id] = roughly(acceleration_m_s2, (east, north, up), air)
     draw = _faults_with_a_plan if planned else _faults_without_a_plan
     schedule = draw(mission, seed)
     for_good = frozenset(name for each in schedule if each.lasts_s is None for name in each.names)
@@ -199,18 +197,25 @@ def roughness(mission: Mission, seed: int, *, planned: bool) -> Roughness:
     return Roughness(rough, change, off_m, loss_frac, schedule, for_good)
 
 
-def _roughly(
-    equipment: Equipment, *, acceleration_m_s2: float, error_m: Point, wind: Wind
-) -> Equipment:
-    """Its receiver is off by the same all the time, as if its origin lay there."""
-    lat_deg, lon_deg, alt_m = wgs84_from_enu(DEFAULT_ORIGIN, error_m)
-    vehicle = replace(
-        equipment.vehicle,
-        acceleration_m_s2=acceleration_m_s2,
-        origin=Origin(lat_deg, lon_deg, alt_m),
-        wind=wind,
-    )
-    return replace(equipment, vehicle=vehicle)
+def roughly(
+    acceleration_m_s2: float, error_m: Point = (0.0, 0.0, 0.0), wind: Wind | None = None
+) -> Change:
+    """Equipment so agile, in that air, whose receiver is off by the same all the time [m].
+
+    As if its origin lay there.
+    """
+    origin = Origin(*wgs84_from_enu(DEFAULT_ORIGIN, error_m))
+
+    def change(equipment: Equipment) -> Equipment:
+        vehicle = replace(
+            equipment.vehicle,
+            acceleration_m_s2=acceleration_m_s2,
+            origin=origin,
+            wind=wind or Wind(),
+        )
+        return replace(equipment, vehicle=vehicle)
+
+    return change
 
 
 def _faults_with_a_plan(mission: Mission, seed: int) -> tuple[Disturbance, ...]:
