@@ -84,8 +84,9 @@ def nothing_left(
 ) -> bool:
     """Whether others surely keep all open tasks from a UAV that became free at ``decided_s``.
 
-    True only if `decide` finds nothing, and told without looking at everybody's place: in a large
-    fleet at the end of its mission each claim makes all who are idle ask.
+    True only if `decide` finds nothing, and told without looking at everybody's place. What others
+    decide meanwhile changes nothing of it, as long as no task opens: in a large fleet at the end of
+    its mission each claim would make all who are idle decide anew.
 
     Args:
         board: the registers and what they say about tasks.

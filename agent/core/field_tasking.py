@@ -433,10 +433,10 @@ class FieldTasking(Tasking):
     def _situated(self, claim: Claim) -> Claim:
         return claim if self._flights.problem is None else self.visits.situated(claim)
 
-    def _stay_idle(self, now_s: float) -> None:
+    def _stay_idle(self, now_s: float, *, awaits_peers: bool = True) -> None:
         if self._machine.state is AgentState.READY_ON_GROUND:
             self._free.adrift = False
-        super()._stay_idle(now_s)
+        super()._stay_idle(now_s, awaits_peers=awaits_peers)
         if self._flights.problem is None:
             return
         if not self._free.awaits_peers:

@@ -307,8 +307,11 @@ class Tasking(AgentPart, ABC):
         if epoch is None or problem is None:
             return
         rule, excluded = self._rule_of(epoch), self._refused.left_alone(now_s)
-        if rule is None or nothing_left(board, since_s, excluded, self._peers.counts):
+        if rule is None:
             self._stay_idle(now_s)
+            return
+        if nothing_left(board, since_s, excluded, self._peers.counts):
+            self._stay_idle(now_s, awaits_peers=False)
             return
         turn = self._turn(since_s, now_s)
         if turn is None:
@@ -390,14 +393,17 @@ class Tasking(AgentPart, ABC):
         turns: dict[str, object] = {"task": left, "for": task}
         self._log("turns aside", **turns, **self._choices.label)
 
-    def _stay_idle(self, now_s: float) -> None:
+    def _stay_idle(self, now_s: float, *, awaits_peers: bool = True) -> None:
+        """Nothing is there for it, as long as nothing opens or, if it awaits them, peers decide."""
         self._give_up_claim()
         free = self._free
         if free.adrift:
             # Nothing to fly to any more: stop here rather than at a lost target.
             self._flights.stop()
         free.adrift, free.to_decide, free.found_nothing = False, False, True
-        patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
+        patience_ends_s = None
+        if awaits_peers:
+            patience_ends_s = self._peers.patience_ends_s(self._replica, now_s)
         free.awaits_peers = patience_ends_s is not None
         free.retry_at_s = patience_ends_s
         if patience_ends_s is None and self._mission_view.unfinished:

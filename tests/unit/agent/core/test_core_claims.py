@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Collection
+from dataclasses import replace
+
 import pytest
 
+from agent.core import tasking
+from agent.core.decision import nothing_left
 from agent.core.interface import GoTo, Refused, Return
 from swarm.model.ids import COORDINATOR
+from swarm.protocol.board import TaskBoard
 from swarm.protocol.events import LinkChanged, MessageReceived, PeerGone, PeerSeen
 from swarm.protocol.messages import TaskEntry
 from swarm.protocol.uav_messages import Claim, ClaimPhase
@@ -141,6 +147,30 @@ def test_it_waits_no_longer_for_those_who_have_decided() -> None:
 
     agent.hear("u2", OUT)
     assert agent.task == "far"
+
+
+def test_where_others_keep_all_that_is_open_it_waits_for_nobody_to_decide(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    agent = LoneAgent(*(uav(f"u{n}") for n in range(4)))
+    agent.fly_to(NEAR)
+    agent.hear("u1", held("near", 0.0))
+    agent.start_mission()
+    looks: list[str] = []
+
+    def look(
+        board: TaskBoard, since_s: float, excluded: Collection[str], counts: Callable[[str], bool]
+    ) -> bool:
+        looks.append("looked")
+        return nothing_left(board, since_s, excluded, counts)
+
+    monkeypatch.setattr(tasking, "nothing_left", look)
+    for writer in ("u2", "u3"):
+        agent.hear(writer, replace(IDLE, decided_s=0.1))
+    assert (looks, agent.task) == ([], None)
+
+    agent.hear("u1", IDLE)
+    assert (looks, agent.task) == (["looked"], "near")
 
 
 def test_a_uav_that_is_a_little_late_still_decides_first() -> None:
