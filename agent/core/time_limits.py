@@ -21,6 +21,8 @@ WITHOUT_AIM: Final = PAUSED_BY_OPERATOR | {AgentState.IDLE}
 """In the air, it stands by nothing there: its way home is all that its battery is for."""
 _AMPLE_FRAC: Final = 0.5
 """With more charge than that above its reserve, it need not look how far its home is."""
+ANOTHER_WAY: Final = "zones make the way another one"
+"""Why a UAV on the ground leaves its task for any other: it has not begun to fly there."""
 
 
 class TimeLimits(AgentPart):
@@ -78,7 +80,7 @@ class TimeLimits(AgentPart):
         # On the ground it may as well depart at another time, or do something else.
         ends_s = self.ends_s(task, claim, (claim.departs_s or 0.0) + way.duration_s)
         if abs(ends_s - claim.completion_s) > TOLERANCE_S:
-            return "zones make the way another one"
+            return ANOTHER_WAY
         end_s = math.inf if claim.sortie_end_s is None else claim.sortie_end_s
         lasts = ends_s + self._home_s(task, claim) <= end_s + TOLERANCE_S
         return None if lasts else "zones make the way home too long"

@@ -40,6 +40,7 @@ from dataclasses import replace
 
 from agent.core.agent_core import IMPOSSIBLE, AgentCore
 from agent.core.interface import GoTo
+from agent.core.time_limits import ANOTHER_WAY
 from coordinator.core.active import CoordinatorCore
 from coordinator.core.standby import StandbyCore
 from coordinator.mission_view.mission_state import MissionState
@@ -181,7 +182,9 @@ class InvariantChecker:
         if note.text == "lost":
             self.message_log.missed(process.name)
         released = note.fields.get("task") if note.text == "released" else None
-        if released is not None and not self._can_go_on(process, str(released)):
+        track, told = self._world.tracks.get(process.name), note.fields.get("reason")
+        anew = told == ANOTHER_WAY and track is not None and track.stood_until(self._now_s)
+        if released is not None and (anew or not self._can_go_on(process, str(released))):
             self.message_log.gave_up(process.name, str(released))
         if note.text == "no way" and "task" in note.fields:
             self.message_log.refused(process.name, str(note.fields["task"]))

@@ -70,6 +70,10 @@ class Track:
                 return piece.position_enu_m(now_s)
         return None
 
+    def stood_until(self, at_s: float) -> bool:
+        """Whether it was on the ground right before that instant."""
+        return self.position_enu_m(math.nextafter(at_s, -math.inf)) is None
+
     def _cut(self, at_s: float) -> None:
         """Forget what was to come after that."""
         while self._pieces and self._pieces[-1].begin_s >= at_s:

@@ -37,6 +37,7 @@ BROKEN_ONCE = {
     11006086: "who hovered above its home in another layer went home through the one between",
     13000758: "who could not come home any more went on asking for its way, and set off on it",
     15000239: "who was told to fly home on its way out of a zone stopped in it to ask for that",
+    18001175: "the judge bound one on the ground to its task though a zone changed its way there",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 
