@@ -89,7 +89,7 @@ class Ground:
         for before, after in pairwise(corners):
             after[0, 2] = before[-1, 2] = max(after[0, 2], before[-1, 2])
         chain_m = np.concatenate([corners[0][:1], *(piece[1:] for piece in corners)])
-        return _with_room(_with_room(chain_m)[::-1])[::-1]
+        return _with_room(chain_m)
 
     def _piece_m(self, begin_m: FloatArray, end_m: FloatArray) -> FloatArray:
         if (end_m < begin_m).any() and tuple(end_m) < tuple(begin_m):
@@ -122,10 +122,18 @@ class Ground:
 
 
 def _with_room(chain_m: FloatArray) -> FloatArray:
-    """A chain with one more corner, soon after the first."""
-    step_m = chain_m[1] - chain_m[0]
+    """A chain with two more corners, soon after the first and soon before the last."""
+    most = 0.5 if len(chain_m) > 2 else 1.0 / 3.0
+    begin_m = _soon_m(chain_m[0], chain_m[1], most)
+    end_m = _soon_m(chain_m[-1], chain_m[-2], most)
+    return np.concatenate([chain_m[:1], begin_m, chain_m[1:-1], end_m, chain_m[-1:]])
+
+
+def _soon_m(here_m: FloatArray, there_m: FloatArray, most: float) -> FloatArray:
+    """The place soon after one on a piece, of which it is that share at most; else none."""
+    step_m = there_m - here_m
     share = _SOON_M / max(float(np.hypot(*step_m[:2])), _SOON_M)
-    return chain_m if share > 0.5 else np.insert(chain_m, 1, chain_m[0] + share * step_m, axis=0)
+    return np.empty((0, 3)) if share > most else (here_m + share * step_m)[None]
 
 
 def _straightened(along_m: FloatArray, up_m: FloatArray, most_m: float) -> IntArray:
