@@ -15,7 +15,7 @@ its simulated autopilot (0.17 %), what router, coordinator and launcher do for i
 CPU_FRAC_SHARED: Final = 0.0075
 """The same where `MANY` agents share a process: 0.5 % for each of them."""
 CPU_FRAC_APART: Final = 0.063
-"""The same of an agent with a process of its own that keeps a separation: 30 of them take 1.9."""
+"""The same of one that keeps a separation, with a process of its own: 30 take 1.9 processors."""
 CPU_FRAC_APART_SHARED: Final = 0.0195
 """And where they share processes: 100 of them take all of two processors, and none is lost."""
 MANY: Final = 10
