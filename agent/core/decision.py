@@ -86,7 +86,8 @@ def nothing_left(
 
     True only if `decide` finds nothing, and told without looking at everybody's place. What others
     decide meanwhile changes nothing of it, as long as no task opens: in a large fleet at the end of
-    its mission each claim would make all who are idle decide anew.
+    its mission each claim would make all who are idle decide anew. A claim keeps nothing from
+    anybody for long once its outcome is told: the next one tells whether its task is open again.
 
     Args:
         board: the registers and what they say about tasks.
@@ -94,11 +95,13 @@ def nothing_left(
         excluded: tasks this UAV cannot take.
         counts: whether that UAV is another one whose claims count.
     """
-    claimants = board.replica.claimants
+    claimants, outcomes = board.replica.claimants, board.replica.outcomes
     return all(
         task in excluded
         or any(
-            (claim.phase is not ClaimPhase.PROPOSED or claim.decided_s < decided_s) and counts(uav)
+            (claim.phase is not ClaimPhase.PROPOSED or claim.decided_s < decided_s)
+            and counts(uav)
+            and (uav, task) not in outcomes
             for uav, claim in claimants.get(task, {}).items()
         )
         for task in board.open

@@ -173,6 +173,18 @@ def test_where_others_keep_all_that_is_open_it_waits_for_nobody_to_decide(
     assert (looks, agent.task) == (["looked"], "near")
 
 
+def test_idle_it_takes_what_another_failed_at_though_that_one_claims_it_again_at_once() -> None:
+    agent = LoneAgent(uav("u0"), uav("u1"), reattempt_failed=True)
+    agent.fly_to(NEAR)
+    agent.hear("u1", held("near", 0.0))
+    agent.start_mission("u0", "u1")
+    assert agent.task is None
+
+    agent.hear("u1", failed("near", completed_s=7.0), 7.0)
+    agent.hear("u1", proposed("near", 7.0, rank=1))
+    assert agent.task == "near"
+
+
 def test_a_uav_that_is_a_little_late_still_decides_first() -> None:
     """As the plan has it; its word is on its way, or it slows down at its task just now."""
     agent = LoneAgent(uav("u0"), uav("u1"))

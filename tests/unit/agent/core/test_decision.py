@@ -27,6 +27,7 @@ from tests.support.builders import (
     entries_of,
     entry,
     epoch,
+    failed,
     held,
     message,
     proposed,
@@ -164,6 +165,8 @@ def test_nothing_is_left_where_each_open_task_is_kept_by_somebody_who_counts() -
     assert not nothing_left(scene.board, 3.0, set(), {"u1", "u2"}.__contains__)
     assert not nothing_left(scene.board, 3.0, {"east"}, {"u1"}.__contains__)
     assert not nothing_left(scene.board, 2.9, {"east"}, {"u1", "u2"}.__contains__)
+    scene.say(COORDINATOR, brief(*FLEET, reattempt_failed=True)).say("u1", failed("mid"))
+    assert not nothing_left(scene.board, 3.0, {"east"}, {"u1", "u2"}.__contains__)
     assert nothing_left(scene.say("u1", done("east")).board, 3.0, {"mid"}, {"u2"}.__contains__)
 
 
