@@ -38,6 +38,7 @@ BROKEN_ONCE = {
     13000758: "who could not come home any more went on asking for its way, and set off on it",
     15000239: "who was told to fly home on its way out of a zone stopped in it to ask for that",
     18001175: "the judge bound one on the ground to its task though a zone changed its way there",
+    21000517: "who set off from a task's own height was led twice as high if it turned at once",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

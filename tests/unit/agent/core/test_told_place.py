@@ -48,8 +48,11 @@ def test_the_height_is_true_in_the_layer_out_of_it_and_on_the_ground() -> None:
     assert (flown_m(seen), seen.told_layer_m) == ((0.0, 0.0, 20.0), None)
     seen.arrive((0.0, 0.0, 60.0), own_height=True)
     assert (flown_m(seen), seen.told_layer_m) == ((0.0, 0.0, 60.0), 0.0)
+    assert (seen.place_enu_m, seen.flown_m) == ((0.0, 0.0, 60.0), 60.0)
     seen.set_off()
     assert flown_m(seen) == (0.0, 0.0, 60.0)
+    # What is reckoned from there before the next word of the vehicle has its height right.
+    assert (seen.place_enu_m, seen.flown_m) == ((0.0, 0.0, 60.0 - LAYER_M), None)
     seen.move(Telemetry((5.0, 0.0, 58.0), (0.0, 0.0, 0.0), None))
     assert (flown_m(seen), seen.told_layer_m) == ((5.0, 0.0, 58.0), None)
     seen.stand((9.0, 0.0, 0.0))
