@@ -332,7 +332,8 @@ class AgentCore(AgentPart):
 
     def _heed_zones(self, now_s: float) -> None:
         """Fly other ways at once where zones have changed."""
-        if not self._tasking.zones_changed():
+        displaced, self._airway.displaced = self._airway.displaced, False
+        if not (self._tasking.zones_changed() or displaced):
             return
         if self.state in HEADED_HOME:
             self._commander.reroute()
@@ -341,6 +342,8 @@ class AgentCore(AgentPart):
 
     def _go_home_if_spent(self, now_s: float) -> None:
         """Bring a UAV that stands by nothing home before its battery is used up."""
+        if not self._commander.may_fly:
+            return
         if (reason := self._tasking.spent(now_s)) is not None and self._machine.acts:
             self._commander.go_home(reason, now_s)
 

@@ -22,6 +22,7 @@ from agent.core.interface import (
     Arrived,
     Event,
     GoTo,
+    HandedOver,
     Held,
     Hold,
     Home,
@@ -32,6 +33,7 @@ from agent.core.interface import (
     Refused,
     Return,
     ReturnAdvised,
+    ReturnBegun,
     Swap,
     Telemetry,
     VehicleOrder,
@@ -39,22 +41,20 @@ from agent.core.interface import (
 )
 from agent.core.kept_air import KeptAir
 from agent.core.mission_view import MissionView, Peers
-from agent.core.place_on_way import PlaceOnWay
-from agent.core.stop_on_way import StopOnWay
+from agent.core.way_flown import WayFlown
 from agent.core.wish import Wish
 from swarm.protocol.events import LogLine
-from swarm.protocol.fields import Point
 from swarm.protocol.registers import Replica
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from swarm.separation.shared_air import SharedAir, adds_nothing
-from swarm.separation.shifted import continued, hovering, landed, left_of_way, lifted, nominal
+from swarm.separation.shifted import continued, hovering, landed, left_of_way, lifted
 
 _BY_GRANT = GoTo | Return | Prepare
 """Orders that may have to wait for a way."""
 
 
-class Airway:
+class Airway(WayFlown):
     """The way of one UAV through the air that its fleet shares."""
 
     def __init__(
@@ -66,34 +66,22 @@ class Airway:
         peers: Peers,
         actions: list[Action],
     ) -> None:
+        super().__init__(timing, mission_view, FleetAir(uav, replica, mission_view, peers))
         self._uav = uav
         self._retry_s = timing.patience_s
         self._replica = replica
-        self._mission_view = mission_view
         self._actions = actions
         self.when_departed: Callable[[], None] = lambda: None
         """Is told when the vehicle is sent off after a wait."""
         self.when_detoured: Callable[[], None] = lambda: None
         """Is told when it is sent off by a longer way than was reckoned with."""
-        self._fleet = FleetAir(uav, replica, mission_view, peers)
         self.last_departure = self._fleet.last_departure
         """What the battery allows."""
-        self._way: ClaimedWay | None = None
-        self._aloft = self._moves = False
-        """Whether the vehicle is in the air, and may be anywhere on its way."""
-        self._halt = StopOnWay(timing.patience_s)
-        self._own_height = False
-        """Whether its way ends at the height of a task."""
-        self._at_own_height = False
-        """Whether it hovers where such a way has ended."""
-        self._flown_leg = STOP_LEG
         self._wish: Wish | None = None
         self._aside: Wish | None = None
         """It makes room, before its wish is asked again."""
         self._kept = KeptAir(uav)
         self._stand = BaseStand()
-        self._lifts_enu_m: Point | None = None
-        """Where it will be in the air that stands on the ground, in its own layer [m]."""
         self._settled: tuple[object, ...] = ()  # what the last look rested on
         self._comes_down = False
         """Whether it lands where it is, whatever home it is told to return to."""
@@ -101,11 +89,12 @@ class Airway:
         """Whether somebody may still have to be let by."""
         self._room_at_s = -math.inf
         """Not before does it look again whether it is in anybody's way."""
-        self._vehicle = PlaceOnWay(timing.patience_s)
         self._rises = False
         """Whether it asks for air to take off into, or has got it, and is not up there yet."""
         self._unplaced: Callable[[], None] | None = None
         """Gives an order anew that waits until the vehicle has told where it flies."""
+        self.displaced = False
+        """Whether it has stopped elsewhere than where its way was worked out from."""
 
     @property
     def waits(self) -> bool:
@@ -137,10 +126,14 @@ class Airway:
             case MotorsRun(ours=True) if self._told_way.flies:
                 self._way = replace(self._told_way, grounded=False)  # it may have left the ground
             case Arrived(leg=leg) if leg == self._flown_leg:
-                self._arrive(self._told_way)
+                self._arrive()
             case Held():
                 self._moves = self._aloft  # it is somewhere on its way
                 self._halt.end()
+            case HandedOver() | ReturnBegun():  # it flies as somebody else has it now
+                self._moves, self._unplaced = self._aloft, None
+                self._halt.end()
+                self._drop_wish()
             case Landed() | Home():
                 self._aloft = self._moves = False
                 self._halt.end()
@@ -241,30 +234,11 @@ class Airway:
         else:
             self._stop()
 
-    @property
-    def stop_enu_m(self) -> Point | None:
-        """Where the vehicle can be stopped, in the layer of the brief [m]; None: as it tells."""
-        here = self._vehicle.enu_m if self._fleet.shared is not None and self._aloft else None
-        return None if here is None else self._nominal(here)
-
     def _drop_wish(self) -> None:
         """Nothing is asked for any more."""
         self._wish = self._aside = None
         if self._way is not None and not self._way.flies:
             self._way = hovering(self._told_way)
-
-    def _here(self) -> Point | None:
-        """Where the vehicle is, or will be in the air, in its own layer; None if not known."""
-        if not self._aloft:
-            place = self._mission_view.place_enu_m
-            if self._lifts_enu_m is None and place is not None:
-                # What the vehicle tells from now on, still on the ground, is not in its layer.
-                self._lifts_enu_m = self._mission_view.in_layer(place)
-            return self._lifts_enu_m
-        path = self._told_way.path_enu_m
-        if not self._moves and path:
-            return self._nominal(path[-1] if self._told_way.flies else path[0])
-        return None if self._vehicle.enu_m is None else self._nominal(self._vehicle.enu_m)
 
     def _stop(self) -> None:
         """Stop where the vehicle was told to be last, which is on its way."""
@@ -272,17 +246,15 @@ class Airway:
             self._flown_leg = STOP_LEG
             self._actions.append(OrderVehicle(self._halt.begin(self._vehicle.enu_m)))
 
-    def _arrive(self, way: ClaimedWay) -> None:
-        self._moves = False
-        if self._wish is not None and self._flown_leg != STOP_LEG:  # it goes on from here
-            self._wish.since_s = self._mission_view.now_s
-        if (place := self._halt.end()) is not None:
-            shift_m = place[2] - self._nominal(place)[2]
-            self._way = replace(way, path_enu_m=(place,), shift_m=shift_m)
-        elif way.flies and way.path_enu_m:  # what is only asked for begins where it hovers
-            shift_m = 0.0 if self._own_height else way.shift_m
-            self._way = replace(way, path_enu_m=way.path_enu_m[-1:], shift_m=shift_m)
-        self._at_own_height, self._own_height = self._own_height, False
+    def _arrive(self) -> None:
+        if self._wish is not None and self._flown_leg != STOP_LEG:
+            self._wish.goes_on(self._mission_view.now_s)
+        self._end_leg()
+        wish, here = self._wish, self._here()
+        if wish is not None and here is not None and wish.is_from_elsewhere(here):
+            again = partial(self.order, own_height=wish.own_height, fixed=wish.fixed)
+            again(wish.order, takes_s=wish.takes_s)
+            self.displaced = True
 
     # -- what it claims ----------------------------------------------------------------------------
 
@@ -353,7 +325,7 @@ class Airway:
 
     def _press(self, air: SharedAir, now_s: float) -> Sequence[Refused | ReturnAdvised]:
         """Ask for what is wished, give way to who is stronger, make room, or give up."""
-        if self._halt.is_due(now_s) and self._wish is not None and self._moves and self._aloft:
+        if self._halt.is_due(now_s) and self._moves and self._aloft:
             self._stop()
         if self._halt.under_way:
             return []
@@ -479,20 +451,10 @@ class Airway:
         if wish.is_shorter_than(path):
             self.when_detoured()
         self._flown_leg = order.leg if isinstance(order, GoTo) else STOP_LEG
+        self._halt.end()
         self._actions.append(OrderVehicle(wish.along(path)))
 
     # -- pieces -----------------------------------------------------------------------------------
-
-    @property
-    def _told_way(self) -> ClaimedWay:
-        if self._way is not None:
-            return self._way
-        # Where it hovers first is its own before it takes off: nobody asks for that.
-        first = self._fleet.hovers_first_enu_m
-        return ClaimedWay(0, first, flies=bool(first), grounded=not self._aloft)
-
-    def _nominal(self, place: Point) -> Point:
-        return nominal(place, self._told_way, own_height=self._own_height)
 
     def _claims(self) -> Mapping[str, Claim]:
         """Of everyone, the own one as it is about to be said."""

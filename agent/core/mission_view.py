@@ -200,7 +200,8 @@ class MissionView:
         """The vehicle flies on, to wherever."""
         if self._out_of_layer and self._place_enu_m is not None:
             east_m, north_m, up_m = self._place_enu_m
-            self._place_enu_m, self._below_m = (east_m, north_m, up_m - self._layer_m), self._layer_m
+            self._place_enu_m = east_m, north_m, up_m - self._layer_m
+            self._below_m = self._layer_m
         self._out_of_layer = False
 
     def stand(self, place_enu_m: Point) -> None:

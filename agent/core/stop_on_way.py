@@ -11,17 +11,22 @@ from agent.core.fleet_air import STOP_LEG
 from agent.core.interface import GoTo
 from swarm.protocol.fields import Point
 
+_MOST_DOUBLED = 4
+"""It is told again after twice as long each time, so many times."""
+
 
 class StopOnWay:
     """The stop that is under way, if any.
 
     Args:
-        retry_s: how long after a refusal it is told again.
+        retry_s: how long after the first refusal it is told again [s].
     """
 
     def __init__(self, retry_s: float) -> None:
         self._retry_s = retry_s
         self._at_enu_m: Point | None = None
+        self._refusals = 0
+        """In a row."""
         self.again_s: float | None = None
         """When it is to be told again [s; own clock]."""
 
@@ -37,7 +42,8 @@ class StopOnWay:
 
     def refused(self, now_s: float) -> None:
         """It has refused that, or to fly where it is sent."""
-        self._at_enu_m, self.again_s = None, now_s + self._retry_s
+        self._at_enu_m, self.again_s = None, now_s + self._retry_s * 2.0**self._refusals
+        self._refusals = min(self._refusals + 1, _MOST_DOUBLED)
 
     def is_due(self, now_s: float) -> bool:
         """Whether it is to be told again now, as it has refused; answered so once."""
@@ -49,4 +55,5 @@ class StopOnWay:
     def end(self) -> Point | None:
         """No more of it; where it was to stop [m], if it was."""
         place_enu_m, self._at_enu_m, self.again_s = self._at_enu_m, None, None
+        self._refusals = 0
         return place_enu_m

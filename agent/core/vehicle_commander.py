@@ -194,6 +194,11 @@ class VehicleCommander(AgentPart):
         elif self._mission_view.said_to_run:
             self.go_home("left the mission in an earlier life", now_s)
 
+    @property
+    def may_fly(self) -> bool:
+        """Whether its vehicle has been in the air, in this life or in an earlier one."""
+        return self._flown or self._flew_before
+
     def prepare(self, me: UavSpec, trigger: Trigger) -> None:
         """Get it ready for tasks, or take it in hand where it is."""
         if not self._machine.take(trigger):

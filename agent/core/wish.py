@@ -12,6 +12,8 @@ from swarm.separation.shifted import length_m
 
 _LONGER_M = 0.5
 """A way is as it was reckoned, to so much [m]."""
+_ELSEWHERE_M = 1.0
+"""Who stops no farther from where its way begins is there [m]."""
 
 
 @dataclass(slots=True)
@@ -59,6 +61,16 @@ class Wish:
         if isinstance(self.order, Return):
             return replace(self.order, path_enu_m=via, via_enu_m=end)
         return self.order
+
+    def goes_on(self, now_s: float) -> None:
+        """It has come to the end of what it flies first, from where it asks for the rest."""
+        if self.takes_s is not None:
+            self.takes_s = max(0.0, self.takes_s - (now_s - self.since_s))
+        self.since_s = now_s
+
+    def is_from_elsewhere(self, place_enu_m: Point) -> bool:
+        """Whether its way begins anywhere but there [m]."""
+        return math.dist(self.corners_enu_m[0], place_enu_m) > _ELSEWHERE_M
 
     def is_shorter_than(self, path_enu_m: Sequence[Point]) -> bool:
         """Whether that path leads a longer way than was reckoned with."""

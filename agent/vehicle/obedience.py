@@ -162,7 +162,9 @@ def go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
             takes_targets = True
         case Holding(returning=None) if session.mission is not None:
             takes_targets = True
-        case Holding():
+        case Returning(flies_by_place=False):
+            takes_targets = False
+        case Holding() | Returning():
             takes_targets = not _must_stop_first(activity, session)
         case _:
             takes_targets = False
@@ -176,7 +178,7 @@ def go_to(activity: Activity, order: GoTo, session: VehicleSession) -> Activity:
         return begin_holding(
             activity, Hold("to be sent round corners or zones"), session, go_next=order
         )
-    if isinstance(activity, Holding):
+    if isinstance(activity, Holding | Returning):
         session.commands.cancel_all()
     session.comes_back_into_zone = _stops_in_zone(order, session)
     flying = Flying(session, session.firmware, order)

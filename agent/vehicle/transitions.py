@@ -86,7 +86,7 @@ SUCCESSORS: Final[dict[FlightPhase, frozenset[FlightPhase]]] = {
         {FlightPhase.HOVERING, FlightPhase.FLYING, FlightPhase.YIELDING, *_IN_THE_AIR, *_LET_GO}
     ),
     FlightPhase.RETURNING: frozenset(
-        {FlightPhase.HOVERING, FlightPhase.YIELDING, *_IN_THE_AIR, *_LET_GO}
+        {FlightPhase.HOVERING, FlightPhase.FLYING, FlightPhase.YIELDING, *_IN_THE_AIR, *_LET_GO}
     ),
     FlightPhase.HANDED_OVER: frozenset(
         {FlightPhase.PREPARING, FlightPhase.RETURNING, FlightPhase.HOVERING, FlightPhase.IDLE}

@@ -389,10 +389,12 @@ class ZenohBus:
 
     def _undeclare_token(self, key: str) -> None:
         token = self._tokens.pop(key, None)
-        if token is not None:
-            token.undeclare()
-        # Until a question has gone to the router and back, this process's token is found itself.
-        self._find_token(key, lambda _: self._call(partial(self._find_others, key)))
+        try:
+            if token is not None:
+                token.undeclare()
+        finally:
+            # Until a question has gone to the router and back, this process's own token is found.
+            self._find_token(key, lambda _: self._call(partial(self._find_others, key)))
 
     def _find_others(self, key: str) -> None:
         """Tell of who else holds it: nothing was told as long as this process did."""
@@ -401,8 +403,15 @@ class ZenohBus:
 
     def _find_token(self, key: str, then: Callable[[bool], object]) -> None:
         found: list[zenoh.Reply] = []
-        ask = Callback(found.append, lambda: then(bool(found)), indirect=False)
-        self._session.liveliness().get(key, ask, timeout=REPLY_WITHIN_S)
+        # A question that nobody answers in time is answered by an error.
+        ask = Callback(
+            found.append, lambda: then(any(r.ok is not None for r in found)), indirect=False
+        )
+        try:
+            self._session.liveliness().get(key, ask, timeout=REPLY_WITHIN_S)
+        except zenoh.ZError:
+            then(False)
+            raise
 
     def _declare_queryable(self, key: str) -> None:
         on_query = _direct(partial(self._on_query, key))
