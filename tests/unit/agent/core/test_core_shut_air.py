@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
 from agent.core.fleet_air import STOP_LEG
@@ -11,14 +9,12 @@ from agent.core.interface import Arrived, GoTo, Refused, Return
 from agent.core.last_departure import LEAVES_ZONE_S
 from agent.core.states import AgentState
 from swarm.protocol.events import LinkChanged
-from swarm.protocol.fields import Point
-from swarm.protocol.messages import CommandKind, TaskEntry
-from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
+from swarm.protocol.messages import CommandKind
 from tests.support.builders import entry
-from tests.support.field_agent import FAR_BASE, FieldAgent, Script, square
+from tests.support.field_agent import FieldAgent, Script, square
 from tests.support.lone_agent import notes, orders
+from tests.support.shut_air import FAR_AWAY, SOON_S, Fleet
 
-FAR_AWAY = ((-900.0, 0.0, 10.0),)
 ACROSS = ((30.0, -80.0, 10.0), (30.0, 80.0, 10.0))
 """Between where this one is and what lies east of it."""
 OVER = square("over", 0.0, 0.0, 8.0)
@@ -26,29 +22,6 @@ OVER = square("over", 0.0, 0.0, 8.0)
 ROUND = tuple((*OVER.polygon_enu_m[corner], 10.0) for corner in (0, 1, 2, 3, 0))
 """All along the border of that."""
 LINE = ((20.0, 0.0, 0.0), (90.0, 0.0, 0.0))
-SOON_S = 1.1
-"""It looks for air again by then."""
-
-
-class Fleet:
-    """The agent of ``u0``, which keeps the air round its start, and ``u1``, who flies there."""
-
-    def __init__(self, *entries: TaskEntry) -> None:
-        self.agent = FieldAgent("u1", bases=[FAR_BASE])
-        self.agent.brief = replace(self.agent.brief, separation_m=5.0, band_m=(8.0, 12.0))
-        self.agent.fly_to(*entries)
-        self.other_flies(*FAR_AWAY)
-        self.agent.be_at((0.0, 0.0, 10.0), None)
-        self.agent.start_mission()
-
-    def other_flies(self, *path: Point) -> None:
-        """The other one is on its way along ``path``."""
-        way = ClaimedWay(0, path, flies=True)
-        self.agent.hear("u1", Claim(ClaimPhase.IDLE, None, 0.0, 1, 0.0, way=way))
-
-    def flights(self, since: int) -> list[GoTo]:
-        """Where it was sent since it had been ordered so often."""
-        return [order for order in orders(self.agent.log)[since:] if isinstance(order, GoTo)]
 
 
 def at_a_line(fleet: Fleet) -> FieldAgent:
