@@ -88,7 +88,8 @@ class LastDeparture:
         """When it sets off on its way if that uses up such a ``share`` of its reserve [s]."""
         me, end_s = self._mission_view.me, self.sortie_end_s()
         if me is None or me.endurance_s is None or math.isinf(end_s):
-            return self._mission_view.mission_s(wish.since_s) + PATIENT_S
+            # By the own clock: who knows of no mission any more has no other.
+            return self._mission_s + wish.since_s + PATIENT_S - self._mission_view.now_s
         reserve_s = me.reserve_frac * me.endurance_s / self.drain_frac()
         return end_s + share * reserve_s - _way_s(wish, me)
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from agent.core.interface import GoTo, Return
-from agent.core.last_departure import LastDeparture
+from agent.core.last_departure import PATIENT_S, LastDeparture
 from agent.core.mission_view import MissionView
 from agent.core.wish import Wish
 from agent.core.zone_stay import ZoneStay
@@ -56,3 +58,8 @@ def test_who_waits_for_the_way_to_a_task_may_look_for_another() -> None:
     wish = Wish(GoTo(1, CORNERS[-1], task="t0"), -100.0, CORNERS, takes_s=WAY_S)
 
     assert not lands(wish, -RESERVE_S)
+
+
+def test_who_knows_of_no_mission_waits_no_longer_than_a_battery_without_end_does() -> None:
+    assert not lands(home(waited_s=PATIENT_S - 2.0 * RETRY_S), math.inf)
+    assert lands(home(waited_s=PATIENT_S), math.inf)
