@@ -69,7 +69,7 @@ class LastDeparture:
     def ends_too_late(self, wish: Wish) -> bool:
         """Whether its way, set off on now, would end when it must have landed already."""
         me = self._mission_view.me
-        return me is not None and self._mission_s + _way_s(wish, me) > self.sortie_end_s()
+        return me is not None and self._mission_s + _way_s(wish, me) > self._end_s
 
     def can_fly(self, wish: Wish, path_enu_m: Sequence[Point]) -> bool:
         """Whether its battery lasts for a way home that climbs into another layer first."""
@@ -86,12 +86,27 @@ class LastDeparture:
 
     def _until_s(self, wish: Wish, share: float) -> float:
         """When it sets off on its way if that uses up such a ``share`` of its reserve [s]."""
-        me, end_s = self._mission_view.me, self.sortie_end_s()
+        me, end_s = self._mission_view.me, self._end_s
         if me is None or me.endurance_s is None or math.isinf(end_s):
             # By the own clock: who knows of no mission any more has no other.
             return self._mission_s + wish.since_s + PATIENT_S - self._mission_view.now_s
         reserve_s = me.reserve_frac * me.endurance_s / self.drain_frac()
         return end_s + share * reserve_s - _way_s(wish, me)
+
+    @property
+    def _end_s(self) -> float:
+        """By when it must have landed [s mission time].
+
+        Before a mission is known to have begun no time passes: what its charge still lasts counts
+        from now; infinite where nobody tells it.
+        """
+        me, told = self._mission_view.me, self._mission_view.telemetry
+        if self._mission_view.clock.is_set or me is None or me.endurance_s is None:
+            return self.sortie_end_s()
+        if told is None or told.battery_frac is None:
+            return math.inf
+        left_s = (told.battery_frac - me.reserve_frac) * me.endurance_s / self.drain_frac()
+        return self._mission_s + left_s
 
     @property
     def _mission_s(self) -> float:

@@ -39,6 +39,7 @@ BROKEN_ONCE = {
     15000239: "who was told to fly home on its way out of a zone stopped in it to ask for that",
     18001175: "the judge bound one on the ground to its task though a zone changed its way there",
     21000517: "who set off from a task's own height was led twice as high if it turned at once",
+    22001564: "who was sent home before its mission began waited until its battery was empty",
     22006210: "who was begun anew, and knew of no mission, waited for its way home for ever",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from agent.core.interface import GoTo, Return
+from agent.core.interface import GoTo, Return, Telemetry
 from agent.core.last_departure import PATIENT_S, LastDeparture
 from agent.core.mission_view import MissionView
 from agent.core.wish import Wish
@@ -24,12 +24,21 @@ def home(waited_s: float = 0.0) -> Wish:
     return Wish(Return("", resume=False), -waited_s, CORNERS, takes_s=WAY_S)
 
 
-def lands(wish: Wish, sortie_end_s: float, drain_frac: float = 1.0) -> bool:
-    """At mission time 0, if its battery drains so many times as fast as planned."""
+def lands(
+    wish: Wish, sortie_end_s: float, drain_frac: float = 1.0, *, left_s: float | None = None
+) -> bool:
+    """At mission time 0, if its battery drains so many times as fast as planned.
+
+    With ``left_s`` before it knows of a mission, its vehicle telling what is left to its reserve.
+    """
     agent = FieldAgent()
     agent.fly_to(entry("t0", 20.0))
     replica = agent.core.replica
     view = MissionView("m", "u0", replica)
+    if left_s is None:
+        view.clock.hear(0.0, 0.0)
+    elif math.isfinite(left_s):
+        view.move(Telemetry(CORNERS[0], (0.0, 0.0, 0.0), (left_s + RESERVE_S) / ENDURANCE_S))
     battery = LastDeparture(view, ZoneStay("u0", replica, view))
     battery.sortie_end_s, battery.drain_frac = lambda: sortie_end_s, lambda: drain_frac
     return battery.must_land(wish, RETRY_S)
@@ -60,6 +69,15 @@ def test_who_waits_for_the_way_to_a_task_may_look_for_another() -> None:
     assert not lands(wish, -RESERVE_S)
 
 
-def test_who_knows_of_no_mission_waits_no_longer_than_a_battery_without_end_does() -> None:
-    assert not lands(home(waited_s=PATIENT_S - 2.0 * RETRY_S), math.inf)
-    assert lands(home(waited_s=PATIENT_S), math.inf)
+def test_who_knows_of_no_mission_goes_by_what_its_vehicle_tells_of_the_charge() -> None:
+    """Whatever had been reckoned with for the mission."""
+    last_s = WAY_S - 0.5 * RESERVE_S + RETRY_S
+    asked_twice = home(waited_s=2.1 * RETRY_S)
+
+    assert not lands(asked_twice, 1e3, left_s=last_s + 0.1)
+    assert lands(asked_twice, 1e3, left_s=last_s - 0.1)
+
+
+def test_who_knows_neither_waits_as_long_as_one_whose_battery_has_no_end() -> None:
+    assert not lands(home(waited_s=PATIENT_S - 2.0 * RETRY_S), 1e3, left_s=math.inf)
+    assert lands(home(waited_s=PATIENT_S), 1e3, left_s=math.inf)
