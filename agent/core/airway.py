@@ -41,7 +41,8 @@ from agent.core.interface import (
 )
 from agent.core.kept_air import KeptAir
 from agent.core.mission_view import MissionView, Peers
-from agent.core.way_flown import WayFlown
+from agent.core.stop_on_way import MOST_DOUBLED
+from agent.core.way_flown import NO_LEG, WayFlown
 from agent.core.wish import Wish
 from swarm.protocol.events import LogLine
 from swarm.protocol.registers import Replica
@@ -89,6 +90,10 @@ class Airway(WayFlown):
         """Whether somebody may still have to be let by."""
         self._room_at_s = -math.inf
         """Not before does it look again whether it is in anybody's way."""
+        self._goes_aside = False
+        """Whether what it flies, or has flown last, is to make room."""
+        self._rooms_refused = 0
+        """How often in a row its vehicle has refused that."""
         self._rises = False
         """Whether it asks for air to take off into, or has got it, and is not up there yet."""
         self._unplaced: Callable[[], None] | None = None
@@ -130,8 +135,8 @@ class Airway(WayFlown):
             case Held():
                 self._moves = self._aloft  # it is somewhere on its way
                 self._halt.end()
-            case HandedOver() | ReturnBegun():  # it flies as somebody else has it now
-                self._moves, self._unplaced = self._aloft, None
+            case HandedOver() | ReturnBegun() if self._aloft:  # it flies as somebody else has it
+                self._moves, self._unplaced, self._flown_leg = True, None, NO_LEG
                 self._halt.end()
                 self._drop_wish()
             case Landed() | Home():
@@ -142,8 +147,11 @@ class Airway(WayFlown):
                 heir = self._fleet.heir(air) if isinstance(event, Home) else None
                 self._way = replace(landed(self._told_way), heir=heir)
             case Refused(order=GoTo(leg=leg)) if leg == self._flown_leg:
-                self._moves = True
-                self._halt.refused(self._mission_view.now_s)
+                self._moves, now_s = True, self._mission_view.now_s
+                self._halt.refused(now_s)
+                if self._goes_aside:  # the same place would be refused again
+                    self._room_at_s = now_s + self._retry_s * 2.0**self._rooms_refused
+                    self._rooms_refused = min(self._rooms_refused + 1, MOST_DOUBLED)
         return event
 
     def recall(self, claim: Claim) -> None:
@@ -228,7 +236,9 @@ class Airway(WayFlown):
             self._way, self._wish = left, None
             self._depart(wish)
             return
-        stays = self._flown_leg != STOP_LEG and not (self._own_height or wish.out_of_layer)
+        stays = self._flown_leg not in (STOP_LEG, NO_LEG) and not (
+            self._own_height or wish.out_of_layer
+        )
         if stays and (further := continued(way, place, corners)) is not None:
             wish.corners_enu_m = further
         else:
@@ -249,12 +259,20 @@ class Airway(WayFlown):
     def _arrive(self) -> None:
         if self._wish is not None and self._flown_leg != STOP_LEG:
             self._wish.goes_on(self._mission_view.now_s)
+        stopped = self._halt.under_way
         self._end_leg()
+        if not stopped:
+            self._rooms_refused = 0
+            return
         wish, here = self._wish, self._here()
-        if wish is not None and here is not None and wish.is_from_elsewhere(here):
-            again = partial(self.order, own_height=wish.own_height, fixed=wish.fixed)
-            again(wish.order, takes_s=wish.takes_s)
-            self.displaced = True
+        if wish is None or here is None or not wish.is_from_elsewhere(here):
+            return
+        if self._goes_aside:  # it knows the way back to where its way begins
+            self._fleet.begin_at(wish, here)
+            return
+        again = partial(self.order, own_height=wish.own_height, fixed=wish.fixed)
+        again(wish.order, takes_s=wish.takes_s)
+        self.displaced = True
 
     # -- what it claims ----------------------------------------------------------------------------
 
@@ -451,6 +469,7 @@ class Airway(WayFlown):
         if wish.is_shorter_than(path):
             self.when_detoured()
         self._flown_leg = order.leg if isinstance(order, GoTo) else STOP_LEG
+        self._goes_aside = wish is self._aside
         self._halt.end()
         self._actions.append(OrderVehicle(wish.along(path)))
 

@@ -11,7 +11,7 @@ from agent.core.fleet_air import STOP_LEG
 from agent.core.interface import GoTo
 from swarm.protocol.fields import Point
 
-_MOST_DOUBLED = 4
+MOST_DOUBLED = 4
 """It is told again after twice as long each time, so many times."""
 
 
@@ -43,7 +43,7 @@ class StopOnWay:
     def refused(self, now_s: float) -> None:
         """It has refused that, or to fly where it is sent."""
         self._at_enu_m, self.again_s = None, now_s + self._retry_s * 2.0**self._refusals
-        self._refusals = min(self._refusals + 1, _MOST_DOUBLED)
+        self._refusals = min(self._refusals + 1, MOST_DOUBLED)
 
     def is_due(self, now_s: float) -> bool:
         """Whether it is to be told again now, as it has refused; answered so once."""

@@ -197,7 +197,7 @@ class VehicleCommander(AgentPart):
     @property
     def may_fly(self) -> bool:
         """Whether its vehicle has been in the air, in this life or in an earlier one."""
-        return self._flown or self._flew_before
+        return self._flown or self._flew_before or self.begun
 
     def prepare(self, me: UavSpec, trigger: Trigger) -> None:
         """Get it ready for tasks, or take it in hand where it is."""

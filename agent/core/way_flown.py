@@ -17,6 +17,9 @@ from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import ClaimedWay
 from swarm.separation.shifted import nominal
 
+NO_LEG = -1
+"""What is flown by a vehicle that does not fly as it was told."""
+
 
 class WayFlown:
     """The way of one UAV as its vehicle flies it.

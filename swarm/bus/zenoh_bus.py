@@ -407,11 +407,7 @@ class ZenohBus:
         ask = Callback(
             found.append, lambda: then(any(r.ok is not None for r in found)), indirect=False
         )
-        try:
-            self._session.liveliness().get(key, ask, timeout=REPLY_WITHIN_S)
-        except zenoh.ZError:
-            then(False)
-            raise
+        self._session.liveliness().get(key, ask, timeout=REPLY_WITHIN_S)
 
     def _declare_queryable(self, key: str) -> None:
         on_query = _direct(partial(self._on_query, key))

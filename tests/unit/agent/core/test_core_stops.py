@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
@@ -14,6 +15,7 @@ from agent.core.interface import (
     HandedOver,
     HeardAgain,
     Held,
+    MotorsRun,
     NotReady,
     Refused,
     Return,
@@ -24,13 +26,15 @@ from agent.core.states import AgentState
 from agent.core.stop_on_way import StopOnWay
 from agent.core.wish import Wish
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.messages import CommandKind
+from swarm.protocol.fields import Point
+from swarm.protocol.messages import CommandKind, TaskEntry
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
 from tests.support.builders import entry
 from tests.support.field_agent import FAR_BASE, FieldAgent, Script, square
 from tests.support.lone_agent import orders
-from tests.support.shut_air import SOON_S, Fleet
+from tests.support.shut_air import FAR_AWAY, SOON_S, Fleet
 
+BESIDE_FAR_AWAY = ((-900.0, 50.0, 10.0),)
 AHEAD = square("ahead", 60.0, 0.0)
 """A zone across the way to the task."""
 
@@ -99,6 +103,7 @@ def test_who_does_not_obey_any_more_is_not_told_to_stop(taken: HandedOver | Retu
     agent.drawn(AHEAD, 21.0)
     agent.happen(Refused(agent.flight, "not now"), 21.1)
     agent.happen(taken, 21.2)
+    agent.happen(Refused(GoTo(STOP_LEG, (21.0, 0.0, 10.0)), "said before that"), 21.3)
     ordered = len(orders(agent.log))
 
     agent.run_until(60.0)
@@ -121,6 +126,116 @@ def test_who_could_not_make_room_stops_and_tries_again(script: Script) -> None:
     assert agent.flight == GoTo(STOP_LEG, (0.0, 0.0, 10.0))
     agent.happen(Arrived(STOP_LEG), 24.5)
     assert agent.flight == aside
+
+
+def test_who_is_refused_to_make_room_again_and_again_tries_more_and_more_seldom(
+    script: Script,
+) -> None:
+    script.items = []
+    agent = Fleet(entry("t0", 100.0)).agent
+    agent.tick(20.0)
+    here, told = (0.0, 0.0, 10.0), len(orders(agent.log))
+    way = ClaimedWay(20_000, ((0.0, -60.0, 10.0), (0.0, 60.0, 10.0)))
+    agent.hear("u1", Claim(ClaimPhase.PROPOSED, "t0", 0.0, 1, 50.0, way=way))
+    tried_s: list[float] = []
+    for tenth in range(200, 800):
+        agent.run_until(tenth / 10.0)
+        news = since(agent, told)
+        told += len(news)
+        for order in news:
+            assert isinstance(order, GoTo)
+            if order.position_enu_m == here:
+                agent.happen(Arrived(STOP_LEG))
+            else:
+                tried_s.append(tenth / 10.0)
+                agent.happen(Refused(order, "out of its fence"))
+            agent.be_at(here, None)
+    assert 6 <= len(tried_s) <= 12, tried_s
+
+
+class Crowd:
+    """The agent of ``u0`` among two others, who grant what it asks for when they are told to."""
+
+    def __init__(self, task: TaskEntry, band_m: tuple[float, float]) -> None:
+        self.agent = FieldAgent("u1", "u2", bases=[FAR_BASE])
+        self.agent.brief = replace(self.agent.brief, separation_m=5.0, band_m=band_m)
+        self.agent.fly_to(task)
+        self.ways = {
+            "u1": ClaimedWay(0, FAR_AWAY, flies=True),
+            "u2": ClaimedWay(0, BESIDE_FAR_AWAY),
+        }
+        self.say("u2", flies=True)
+        self.agent.be_at((0.0, 0.0, 10.0), None)
+        self.agent.start_mission()
+
+    def say(self, writer: str, *path: Point, flies: bool, grants: int = 0) -> None:
+        """That one flies along ``path``, or asks for it, or says the same again."""
+        number = 0 if flies else 1
+        way = ClaimedWay(number, path or self.ways[writer].path_enu_m, flies=flies)
+        self.ways[writer] = way
+        for who, its in self.ways.items():
+            told = replace(its, grants={"u0": grants} if grants else {})
+            self.agent.hear(who, Claim(ClaimPhase.IDLE, None, 0.0, 1, 0.0, way=told))
+
+    def grant(self) -> None:
+        """Both grant what it asks for."""
+        claim = self.agent.claim
+        assert claim is not None
+        assert claim.way is not None
+        self.say("u2", flies=self.ways["u2"].flies, grants=claim.way.number)
+
+
+@pytest.mark.parametrize("refused", [False, True], ids=["aside", "on-its-way-aside"])
+@pytest.mark.parametrize(
+    ("height_m", "highest_m"),
+    [(60.0, 12.0), (60.0, 60.0), (None, 12.0)],
+    ids=["high", "straight-down", "in-its-layer"],
+)
+def test_who_has_made_room_where_its_line_begins_flies_all_of_it(
+    script: Script, height_m: float | None, highest_m: float, refused: bool
+) -> None:
+    script.items = ["t0"]
+    line = ((20.0, 0.0, 0.0), (90.0, 0.0, 0.0))
+    crowd = Crowd(entry("t0", 20.0, path_enu_m=line, height_m=height_m), (8.0, highest_m))
+    agent = crowd.agent
+    crowd.grant()
+    agent.run_until(1.0)
+    begins_m = agent.flight.position_enu_m
+    up_m = begins_m[2]
+    heights_m = (up_m,) if height_m else (8.0, 12.0)
+    shut = [(60.0, side_m, at_m) for at_m in heights_m for side_m in (-80.0, 80.0)]
+    crowd.say("u1", *shut, *shut[:1], flies=True)
+    agent.be_at(begins_m, None, 20.0)
+    agent.arrive(20.0)
+    agent.run_until(22.0)
+    ordered = len(orders(agent.log))
+    crowd.say("u2", (20.0, -80.0, up_m), (20.0, 80.0, up_m), flies=False)
+    agent.run_until(23.0)
+    crowd.grant()
+    agent.run_until(23.5)
+    (aside,) = since(agent, ordered)
+    assert isinstance(aside, GoTo)
+    assert aside.task is None
+    stands_m = aside.position_enu_m
+    if refused:
+        stands_m = (20.0 + 0.6 * (stands_m[0] - 20.0), 0.6 * stands_m[1], stands_m[2])
+        agent.be_at(stands_m, None, 25.0)
+        agent.happen(Refused(aside, "not taken"))
+        agent.run_until(27.0)
+        crowd.say("u2", *BESIDE_FAR_AWAY, flies=True)
+    agent.be_at(stands_m, None, 28.0)
+    agent.happen(Arrived(STOP_LEG))
+    crowd.say("u1", *FAR_AWAY, flies=True)
+    crowd.say("u2", *BESIDE_FAR_AWAY, flies=True)
+    for at_s in (29.0, 30.0, 31.0, 34.0):
+        agent.run_until(at_s)
+        crowd.grant()
+
+    flown = agent.flight
+    assert flown.task == "t0"
+    assert min(math.dist(begins_m[:2], each[:2]) for each in (*flown.via_enu_m, stands_m)) < 0.1
+    if height_m:  # at its own height from there on
+        assert begins_m in flown.via_enu_m, flown
 
 
 def test_each_refusal_is_followed_by_a_longer_wait_until_it_stops() -> None:
@@ -158,3 +273,16 @@ def test_who_is_held_on_the_ground_with_a_low_battery_stays_in_the_mission() -> 
     agent.be_at((0.0, 0.0, 0.0), 0.19, -40.0)
     agent.tick(-39.0)
     assert agent.state() is AgentState.PAUSED
+
+
+def test_who_is_held_as_it_takes_off_comes_home_by_its_battery() -> None:
+    agent = FieldAgent("u1", bases=[FAR_BASE])
+    agent.see(COORDINATOR, "u1")
+    agent.learn(agent.statement(COORDINATOR, agent.brief))
+    agent.happen(MotorsRun(ours=True))
+    agent.told(CommandKind.HOLD, -50.0)
+    agent.happen(Held())
+
+    agent.be_at((0.0, 0.0, 5.0), 0.19, -40.0)
+    agent.tick(-39.0)
+    assert agent.state() is AgentState.RETURNING_VIA_START
