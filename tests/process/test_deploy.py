@@ -249,7 +249,8 @@ def machine() -> dict[str, Any]:
 def said_by(script: str, folder: Path, environment: Mapping[str, str]) -> list[list[str]]:
     """Command lines of `swarm` that a script of the compose file comes to."""
     stub, said = folder / "swarm", folder / "said"
-    stub.write_text('#!/bin/sh\n(printf "%s\\t" "$@"; echo) >>"$SAID"\n')
+    # A line in one piece: several write at the same moment.
+    stub.write_text('#!/bin/sh\nprintf "%s\\n" "$(printf "%s\\t" "$@")" >>"$SAID"\n')
     stub.chmod(0o755)
     said.unlink(missing_ok=True)
     shell = shutil.which("sh")
