@@ -92,7 +92,8 @@ class Projection:
         if self._bounds_deg is not None:
             west, south, east, north = self._bounds_deg
             outside |= (lat_deg < south - _BEYOND_DEG) | (lat_deg > north + _BEYOND_DEG)
-            outside |= (lon_deg - west + _BEYOND_DEG) % 360.0 > (east - west) + 2.0 * _BEYOND_DEG
+            east_deg = np.where(outside, 0.0, lon_deg - west + _BEYOND_DEG) % 360.0
+            outside |= east_deg > (east - west) + 2.0 * _BEYOND_DEG
         if outside.any():
             wrong = int(np.argmax(outside))
             return f"{x[wrong]:g}, {y[wrong]:g} lies outside of where {self.name} holds"

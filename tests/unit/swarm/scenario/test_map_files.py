@@ -394,6 +394,13 @@ def test_places_in_any_projection_are_found_again(
             ),
         ),
         (
+            shapes_in(UTM, (-1.4e300, 5.2e6)),
+            (
+                "f: p, record 1: -1.4e+300, 5.2e+06 lies outside of where WGS 84 / UTM zone 32N "
+                "holds; save it with the right .prj, or in EPSG:4326"
+            ),
+        ),
+        (
             shapes_in(UTM, (float("nan"), 47.0)),
             (
                 "f: p, record 1: has a coordinate that is no number; "
