@@ -91,7 +91,7 @@ class Airway(WayFlown):
         self._room_at_s = -math.inf
         """Not before does it look again whether it is in anybody's way."""
         self._goes_aside = False
-        """Whether what it flies, or has flown last, is to make room."""
+        """Whether it flies to make room, or stops on that way."""
         self._rooms_refused = 0
         """How often in a row its vehicle has refused that."""
         self._rises = False
@@ -247,6 +247,7 @@ class Airway(WayFlown):
     def _drop_wish(self) -> None:
         """Nothing is asked for any more."""
         self._wish = self._aside = None
+        self._goes_aside = False
         if self._way is not None and not self._way.flies:
             self._way = hovering(self._told_way)
 
@@ -259,7 +260,7 @@ class Airway(WayFlown):
     def _arrive(self) -> None:
         if self._wish is not None and self._flown_leg != STOP_LEG:
             self._wish.goes_on(self._mission_view.now_s)
-        stopped = self._halt.under_way
+        stopped, was_aside, self._goes_aside = self._halt.under_way, self._goes_aside, False
         self._end_leg()
         if not stopped:
             self._rooms_refused = 0
@@ -267,7 +268,7 @@ class Airway(WayFlown):
         wish, here = self._wish, self._here()
         if wish is None or here is None or not wish.is_from_elsewhere(here):
             return
-        if self._goes_aside:  # it knows the way back to where its way begins
+        if was_aside:  # it knows the way back to where its way begins
             self._fleet.begin_at(wish, here)
             return
         again = partial(self.order, own_height=wish.own_height, fixed=wish.fixed)

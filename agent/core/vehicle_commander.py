@@ -196,7 +196,7 @@ class VehicleCommander(AgentPart):
 
     @property
     def may_fly(self) -> bool:
-        """Whether its vehicle has been in the air, in this life or in an earlier one."""
+        """Whether its vehicle has been in the air, in this life or an earlier one, or takes off."""
         return self._flown or self._flew_before or self.begun
 
     def prepare(self, me: UavSpec, trigger: Trigger) -> None:
