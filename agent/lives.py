@@ -17,13 +17,13 @@ from swarm.bus.config import BusConfig, ClientTopology
 from swarm.bus.port import Bus
 from swarm.bus.shared_seats import SharedBus, SharedSeats
 from swarm.protocol.messages import MissionConfig
-from swarm.protocol.shared_messages import SharedMessages
 from swarm.runtime import garbage
 from swarm.runtime.clock import Clock
 from swarm.runtime.errors import Fault, InputError
 from swarm.runtime.log import get_logger, identify_task
 from swarm.runtime.process import SERVICE_NOTIFIER, StopRequest, stop_requests
 from swarm.runtime.store import Memory, Store
+from swarm.runtime.turns import SharedProcess
 
 JOIN_S: Final = 3.0
 """Wall time that one of several agents gets to join before the next one begins."""
@@ -97,7 +97,7 @@ def live(
         stop: StopRequest,
         joined: asyncio.Event,
         open_seat: Callable[[], Awaitable[Bus]],
-        shared: SharedMessages | None,
+        shared: SharedProcess | None,
     ) -> int:
         def make_vehicle(brief: MissionConfig, report: OnReport) -> Vehicle:
             joined.set()
@@ -121,7 +121,7 @@ def live(
         async with stop_requests(lifeline=lifeline) as stop:
             if len(lives) == 1:
                 return await live_one(lives[0], stop, asyncio.Event(), open_bus, None)
-            seats, shared = SharedSeats(open_bus), SharedMessages()
+            seats, shared = SharedSeats(open_bus), SharedProcess()
             return await live_together(
                 lives, lambda each, joined: live_one(each, stop, joined, seats.seat, shared)
             )

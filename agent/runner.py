@@ -31,7 +31,6 @@ from agent.core.station_words import StationAction, StationAsked
 from swarm.bus.port import Bus
 from swarm.protocol.events import Stop
 from swarm.protocol.messages import MissionConfig, Snapshot
-from swarm.protocol.shared_messages import SharedMessages
 from swarm.protocol.sync import some_of
 from swarm.protocol.timing import PRESETS, LinkKind
 from swarm.runtime.clock import Clock
@@ -40,6 +39,7 @@ from swarm.runtime.joining import join_mission
 from swarm.runtime.process import SERVICE_NOTIFIER, ServiceNotifier, StopRequest
 from swarm.runtime.shell import Shell
 from swarm.runtime.store import Memory, Store
+from swarm.runtime.turns import SharedProcess
 
 RETRY_S = 0.5
 """Wall time between a failed try for a seat on the bus and the next."""
@@ -151,7 +151,7 @@ async def live_once(
     store: Store | None,
     answer_s: float,
     on_wait: Callable[[str], None],
-    shared: SharedMessages | None = None,
+    shared: SharedProcess | None = None,
 ) -> int:
     """One life of an agent, from its seat on the bus to its end; the exit status.
 
@@ -204,7 +204,7 @@ async def run_agent(
     *,
     save: Callable[[Snapshot], None] | None = None,
     answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
-    shared: SharedMessages | None = None,
+    shared: SharedProcess | None = None,
 ) -> int:
     """Fly one UAV until the mission has ended and the vehicle is home.
 
@@ -217,7 +217,7 @@ async def run_agent(
         stop: asks to leave early: the vehicle is told to return first, and seen to.
         save: keeps what the core knows for its next life.
         answer_s: how long a question waits for the slowest answer [wall s].
-        shared: what other agents in this process have heard of the mission.
+        shared: what it has in common with other agents in this process.
 
     Returns:
         Exit status.
@@ -259,7 +259,7 @@ class _Flight:
         *,
         save: Callable[[Snapshot], None] | None,
         answer_s: float,
-        shared: SharedMessages | None,
+        shared: SharedProcess | None,
     ) -> None:
         self.vehicle: Vehicle | None = None
         self.starting: asyncio.Task[None] | None = None
@@ -285,6 +285,7 @@ class _Flight:
             answer_s=answer_s,
             together=lambda heard: heard,
             settled=lambda: not core.is_contested,
+            pressing_s=core.next_own_deadline_s,
             crowd=lambda there: some_of(core.uav, there),
             shared=shared,
         )
@@ -312,10 +313,13 @@ class _Flight:
     def _report(self, news: VehicleReport | StationAsked) -> None:
         if isinstance(news, ReturnBegun):
             self.returns.set()
-        # What the next task is may follow, or who gives way.
-        if not isinstance(news, Telemetry) or self.shell.is_due:
-            self.shell.gather()
-        self.shell.step(news)
+        if not isinstance(news, Telemetry):
+            self.shell.gather()  # what the next task is may follow
+            self.shell.step(news)
+        elif self.shell.is_due:  # such as who gives way
+            self.shell.step_in_turn(news)
+        else:
+            self.shell.step(news)
 
     def _failed(self, task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (fault := task.exception()):

@@ -119,8 +119,9 @@ class CoordinatorCore:
             self._membership.held_up(now_s)
             self._doubt_all(now_s)
             self._actions.append(LogLine("was held up"))
+        waits = self._may_wait(event, now_s)
         self._handle(event, now_s)
-        if not self._mission.is_over:
+        if not self._mission.is_over and not waits:
             self._give_up_lost(now_s)
             if not self._state_query.unsure:
                 self._actions += self._mission.advance(now_s)
@@ -200,6 +201,18 @@ class CoordinatorCore:
                 self._actions += self._mission.end(reason, now_s)
             case _:
                 pass
+
+    def _may_wait(self, event: CoordinatorEvent, now_s: float) -> bool:
+        """Whether nothing is due, and UAVs that are there only say how they are.
+
+        That changes nothing of the mission, and of a large fleet one says so each few milliseconds.
+        """
+        if not isinstance(event, MessageReceived | MessagesReceived):
+            return False
+        due_s, present = self.next_deadline_s(), self._membership.present
+        return (due_s is None or due_s > now_s) and all(
+            isinstance(said.body, Status) and said.writer in present for said in event.messages
+        )
 
     def _hear_any(self, message: Message, now_s: float) -> None:
         if message.writer == COORDINATOR:

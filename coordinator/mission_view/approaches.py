@@ -21,8 +21,8 @@ _Indices = npt.NDArray[np.intp]
 
 NEAR_M: Final = 20.0
 """What `swarm explain` tells of in a mission that asks for no separation."""
-_BATCH: Final = 512
-"""Pieces of ways that are looked at together."""
+_BATCH: Final = 32
+"""Pieces of ways that are looked at together: few, as whoever looks hears nothing meanwhile."""
 _AT_ONCE: Final = 500_000
 """Pairs of pieces likewise."""
 _UAV, _STARTED, _BEGIN, _END, _ERROR = 0, 1, 2, 3, 10
@@ -196,7 +196,11 @@ class ObservedApproaches:
         pieces = np.concatenate([self._known, fresh])
         rows = max(1, _AT_ONCE // len(pieces))
         for first in range(len(self._known), len(pieces), rows):
-            self._compare(pieces, np.arange(first, min(first + rows, len(pieces))))
+            last = min(first + rows, len(pieces))
+            begin_s, end_s = pieces[first:last, _BEGIN].min(), pieces[first:last, _END].max()
+            before = pieces[:last]
+            meet = (before[:, _END] >= begin_s) & (before[:, _BEGIN] <= end_s)
+            self._compare(before[meet], np.arange(np.count_nonzero(meet[:first]), meet.sum()))
         newest_s = [
             pieces[of_it, _END].max() if (of_it := pieces[:, _STARTED] == started).any() else 0.0
             for started in (0.0, 1.0)

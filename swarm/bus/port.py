@@ -17,7 +17,7 @@ from __future__ import annotations
 import asyncio
 import threading
 from collections import deque
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Protocol
 
@@ -151,6 +151,14 @@ class Inbox:
         with self._lock:
             if not self._put(event, latest, admitted):
                 return
+            self._waking = True
+        self._ready.set()
+
+    def offer_admitted(self, samples: Iterable[tuple[Sample, bool]]) -> None:
+        """Hand over what was admitted, and whether the latest of its key is enough; see `offer`."""
+        with self._lock:
+            for sample, latest in samples:
+                self._put(sample, latest, admitted=True)
             self._waking = True
         self._ready.set()
 

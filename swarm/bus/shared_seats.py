@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import math
 from collections import Counter, deque
 from collections.abc import Awaitable, Callable, Iterator, Sequence
 from dataclasses import dataclass, field
@@ -39,6 +40,8 @@ from swarm.runtime.log import get_logger
 
 MOST_WAITING: Final = 8192
 """Samples of one seat that wait to be gathered."""
+_GATHER_S: Final = 0.005
+"""Between two looks at what waits on the bus, whichever seats want it: there are dozens."""
 _MOST_KEYS: Final = 4096
 """Keys of which is kept by what they are subscribed to."""
 
@@ -78,11 +81,15 @@ class SharedSeats:
         self._linked = False
         self._subscribed: dict[str, _Subscription] = {}
         """By key expression, what the bus has been asked for."""
+        self._hearers: dict[str, list[tuple[SharedSeat, _Subscription]]] = {}
+        """By key expression, who wants to hear it, and how."""
         self._tokens: dict[str, set[str]] = {}
         """By key expression that is watched, tokens of others on the bus."""
         self._matching: dict[str, list[str]] = {}
         """By key, the expressions subscribed to that match it."""
         self._dropped = 0
+        self._gathered_s = -math.inf
+        """When the bus was last asked for what waits, in the loop's time."""
 
     async def seat(self, *, inbox_capacity: int = 4096) -> SharedSeat:
         """One more seat.
@@ -133,7 +140,7 @@ class SharedSeats:
         if self._reading is not None:
             self._reading.cancel()
         self._linked = False
-        for known in (self._subscribed, self._tokens, self._matching):
+        for known in (self._subscribed, self._hearers, self._tokens, self._matching):
             known.clear()
         if bus is not None:
             bus.close()
@@ -148,16 +155,23 @@ class SharedSeats:
 
     def subscribed(self, key_expr: str) -> None:
         """What seats want to hear of it has changed."""
-        wanted = [s.subscriptions[key_expr] for s in self._seats if key_expr in s.subscriptions]
+        wanted = [
+            (seat, how)
+            for seat in self._seats
+            if (how := seat.subscriptions.get(key_expr)) is not None
+        ]
+        self._hearers[key_expr] = wanted
         if key_expr not in self._subscribed or not wanted:
             self._matching.clear()
         if not wanted:
+            del self._hearers[key_expr]
             if self._subscribed.pop(key_expr, None) is not None:
                 self.bus.unsubscribe(key_expr)
             return
         # One that gathers does so often enough for who has just come and wants all at once, and
         # to change from one to the other would lose what waits.
-        latest, gathered = all(w.latest for w in wanted), any(w.gathered for w in wanted)
+        latest = all(how.latest for _, how in wanted)
+        gathered = any(how.gathered for _, how in wanted)
         if self._subscribed.get(key_expr) != (now := _Subscription(latest, gathered)):
             self._subscribed[key_expr] = now
             self.bus.subscribe(key_expr, latest=latest, gathered=gathered)
@@ -167,9 +181,12 @@ class SharedSeats:
         self._hand_round(sample, but=seat)
 
     def gather(self) -> None:
-        """Hand round what waits outside of the bus's inbox."""
-        self.bus.gather()
-        self._take(self.bus)
+        """Hand round what waits outside of the bus's inbox, if that was not done just now."""
+        now_s = asyncio.get_running_loop().time()
+        if now_s - self._gathered_s >= _GATHER_S:
+            self._gathered_s = now_s
+            self.bus.gather()
+            self._take(self.bus)
 
     def declare_token(self, key: str) -> None:
         """One of the seats holds it from now on."""
@@ -251,9 +268,8 @@ class SharedSeats:
             matching = [each for each in self._subscribed if _matches(each, sample.key)]
             self._matching[sample.key] = matching
         for key_expr in matching:
-            for seat in self._seats:
-                how = seat.subscriptions.get(key_expr)
-                if how is None or seat is but:
+            for seat, how in self._hearers[key_expr]:
+                if seat is but:
                     continue
                 if how.gathered:
                     seat.inbox.dropped += len(seat.waiting) == MOST_WAITING  # the oldest of them
@@ -302,9 +318,9 @@ class SharedSeat:
         """See `swarm.bus.port.Bus`."""
         self._open_bus()
         self._seats.gather()
-        waiting, self.waiting = self.waiting, deque(maxlen=MOST_WAITING)
-        for sample, latest in waiting:
-            self._inbox.offer(sample, latest, admitted=True)
+        if self.waiting:
+            self._inbox.offer_admitted(self.waiting)
+            self.waiting.clear()
 
     def unsubscribe(self, key_expr: str) -> None:
         """Receive nothing more by that very subscription."""

@@ -9,6 +9,7 @@ it leaves to ``execute``.
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import Counter, deque
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
@@ -49,13 +50,13 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.registers import NO_ROOM
 from swarm.protocol.seal import Seal
-from swarm.protocol.shared_messages import SharedMessages
 from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind
 from swarm.protocol.uav_messages import News
 from swarm.runtime.clock import Clock
 from swarm.runtime.joining import gathered_keys
 from swarm.runtime.log import get_logger
 from swarm.runtime.state_exchange import StateExchange, draw_nonce
+from swarm.runtime.turns import SharedProcess
 
 TURN = 20
 """Events from the bus between two looks at everything else."""
@@ -110,8 +111,10 @@ class Shell(Generic[E, A]):
             board and word of somebody near: it looks now and then, and before it decides anything
             by itself. None for a core that wants to hear each when it comes.
         settled: whether nothing would follow at once from what others claim.
+        pressing_s: when something is due next that can't wait until others in this process have had
+            their turn; None: nothing is, as far as is known. By default nothing can wait.
         crowd: see `StateExchange`.
-        shared: what others in this process have heard; None for one that is alone there.
+        shared: what it has in common with others in this process; None for one that is alone there.
     """
 
     def __init__(
@@ -135,8 +138,9 @@ class Shell(Generic[E, A]):
         draw_nonce: Callable[[], bytes] = draw_nonce,
         together: Callable[[MessagesReceived], E] | None = None,
         settled: Callable[[], bool] = lambda: True,
+        pressing_s: Callable[[], float | None] = lambda: -math.inf,
         crowd: Callable[[Collection[str]], Sequence[str]] | None = None,
-        shared: SharedMessages | None = None,
+        shared: SharedProcess | None = None,
     ) -> None:
         self._core = core
         self._bus = bus
@@ -144,7 +148,7 @@ class Shell(Generic[E, A]):
         self._mission = mission
         self._keys = KeySpace(mission)
         self._seal = bus.seal
-        self._codec = Codec(mission, bus.seal, shared)
+        self._codec = Codec(mission, bus.seal, None if shared is None else shared.messages)
         self._admission = AdmissionControl(self._keys, bus.seal, clock.now_s)
         bus.inbox.admits = self._admission.admits
         self._log = get_logger(name, mission=mission)
@@ -173,8 +177,15 @@ class Shell(Generic[E, A]):
         self._asking: set[asyncio.Task[None]] = set()
         self._together = together
         self._settled = settled
+        self._pressing_s = pressing_s
+        self._turns = None if shared is None else shared.turns
+        self._waits_for_turn = False
+        self._put_off: E | None = None
+        """What the core is to hear when it has its turn."""
         self._gathering: asyncio.TimerHandle | None = None
         """Rings when it is time to look; None in small fleets."""
+        self._gathered_s = 0.0
+        """When it looked last, in the loop's time."""
         self._unread: deque[BusEvent] = deque()
         self._heard: list[Message] = []
         """What the core is still to hear of what was read."""
@@ -215,6 +226,12 @@ class Shell(Generic[E, A]):
 
         An event that comes up while another is being dealt with follows it.
         """
+        put_off, self._put_off = self._put_off, None
+        if put_off is not None:
+            self._events.append(put_off)
+        self._step(event)
+
+    def _step(self, event: E) -> None:
         self._events.append(event)
         if not self._busy:
             self._guard(self._step_all)
@@ -236,6 +253,7 @@ class Shell(Generic[E, A]):
     def gather(self) -> None:
         """Let the core hear now what has come; call before something that it may decide by."""
         if self._gathering is not None and not self._done.done():
+            self._gathered_s = self._loop.time()
             self._bus.gather()
             self._unread.extend(self._bus.inbox.take())
             self._read(len(self._unread))
@@ -344,19 +362,46 @@ class Shell(Generic[E, A]):
         self._bus.subscribe(key_expr, latest=True, gathered=self._gathering is not None)
 
     def _reschedule(self) -> None:
+        self._ring_at(self._core.next_deadline_s())
+
+    def _ring_at(self, deadline_s: float | None) -> None:
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        deadline_s = self._core.next_deadline_s()
         if deadline_s is not None and not self._done.done():
             delay_s = self._clock.wall_delay_s(deadline_s - self._clock.now_s())
             self._timer = self._loop.call_later(max(0.0, delay_s), self._tick)
 
+    def step_in_turn(self, event: E) -> None:
+        """Step the core with ``event`` and what is due, once others in this process had their turn.
+
+        At once if that presses, and before whatever it is stepped with next but words of others.
+        Of several events that wait for their turn it hears the last; call from the loop's thread.
+        """
+        self._put_off = event
+        self._tick()
+
     def _tick(self) -> None:
+        pressing_s, now_s = self._pressing_s(), self._clock.now_s()
+        if self._turns is None or (pressing_s is not None and pressing_s <= now_s):
+            self._take_turn()
+            return
+        if not self._waits_for_turn:
+            self._waits_for_turn = True
+            self._turns.put_off(self._take_turn)
+        self._ring_at(pressing_s)
+
+    def _take_turn(self) -> None:
+        self._waits_for_turn = False
+        if self._done.done():
+            return
         self.gather()
-        if self.is_due:
-            self.step(self._from_bus(Tick()))
-        elif not self._done.done():  # what was gathered has seen to it, or the timer was early
+        put_off, self._put_off = self._put_off, None
+        if put_off is not None:
+            self._step(put_off)
+        elif self.is_due:
+            self._step(self._from_bus(Tick()))
+        else:  # what was gathered has seen to it, or the timer was early
             self._guard(lambda: None)
 
     @property
@@ -366,10 +411,12 @@ class Shell(Generic[E, A]):
         return deadline_s is not None and deadline_s <= self._clock.now_s()
 
     def _gather(self) -> None:
-        """Take what has come into the inbox, and look again later."""
-        self._bus.gather()
-        wait_s = GATHER_SETTLED_S if self._settled() else GATHER_S
-        self._gathering = self._loop.call_later(wait_s, self._gather)
+        """Take what has come into the inbox, if that was not done since, and look again later."""
+        now_s, wait_s = self._loop.time(), GATHER_SETTLED_S if self._settled() else GATHER_S
+        if self._gathered_s + wait_s <= now_s:
+            self._gathered_s = now_s
+            self._bus.gather()
+        self._gathering = self._loop.call_at(self._gathered_s + wait_s, self._gather)
 
     def _fail(self, task: asyncio.Task[None]) -> None:
         if not task.cancelled() and (fault := task.exception()):
@@ -379,6 +426,10 @@ class Shell(Generic[E, A]):
         while True:
             await self._bus.inbox.wait()
             self._unread.extend(self._bus.inbox.take())
+            if not self._unread:  # it was gathered meanwhile
+                continue
+            if self._turns is not None:
+                await self._turns.mine()
             self._count()
             while self._unread:
                 self._read(TURN)
@@ -399,7 +450,7 @@ class Shell(Generic[E, A]):
     def _tell_heard(self) -> None:
         if self._heard and self._together is not None:
             heard, self._heard = self._heard, []
-            self.step(self._together(MessagesReceived(tuple(heard))))
+            self._step(self._together(MessagesReceived(tuple(heard))))
 
     def _tell_newer(self) -> None:
         """Tell people once of each kind: it is no fault to be of another release."""

@@ -12,6 +12,7 @@ from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, Snapshot
 from swarm.runtime.joining import join_mission
 from swarm.runtime.shell import Shell
+from swarm.runtime.turns import SharedProcess
 from tests.support.builders import MISSION, held, message
 from tests.support.memory_bus import MemoryBus, MemoryNetwork
 from tests.support.shell_play import HandClock
@@ -94,6 +95,8 @@ async def at_work(
     capacity: int = 4096,
     together: Callable[[MessagesReceived], CommonEvent] | None = None,
     crowd: Callable[[Collection[str]], Sequence[str]] | None = None,
+    pressing_s: Callable[[], float | None] = lambda: None,
+    shared: SharedProcess | None = None,
     name: str = "u0",
 ) -> AsyncIterator[Played]:
     """A shell that runs ``core`` on the seat of ``name``, seen from the seat of u1."""
@@ -123,6 +126,8 @@ async def at_work(
         save=save,
         together=together,
         crowd=crowd,
+        pressing_s=pressing_s,
+        shared=shared,
     )
     running = asyncio.create_task(shell.run())
     try:
