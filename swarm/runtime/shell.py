@@ -56,7 +56,7 @@ from swarm.runtime.clock import Clock
 from swarm.runtime.joining import gathered_keys
 from swarm.runtime.log import get_logger
 from swarm.runtime.state_exchange import StateExchange, draw_nonce
-from swarm.runtime.turns import SharedProcess
+from swarm.runtime.turns import Alarm, SharedProcess
 
 TURN = 20
 """Events from the bus between two looks at everything else."""
@@ -111,8 +111,7 @@ class Shell(Generic[E, A]):
             board and word of somebody near: it looks now and then, and before it decides anything
             by itself. None for a core that wants to hear each when it comes.
         settled: whether nothing would follow at once from what others claim.
-        pressing_s: when something is due next that can't wait until others in this process have had
-            their turn; None: nothing is, as far as is known. By default nothing can wait.
+        pressing_s: see `Alarm`; by default nothing can wait.
         crowd: see `StateExchange`.
         shared: what it has in common with others in this process; None for one that is alone there.
     """
@@ -173,13 +172,11 @@ class Shell(Generic[E, A]):
         self._context = context
         self._loop = asyncio.get_running_loop()
         self._done: asyncio.Future[int] = self._loop.create_future()
-        self._timer: asyncio.TimerHandle | None = None
         self._asking: set[asyncio.Task[None]] = set()
         self._together = together
         self._settled = settled
-        self._pressing_s = pressing_s
         self._turns = None if shared is None else shared.turns
-        self._waits_for_turn = False
+        self._alarm = Alarm(clock, self._turns, pressing_s, self._look)
         self._put_off: E | None = None
         """What the core is to hear when it has its turn."""
         self._gathering: asyncio.TimerHandle | None = None
@@ -217,9 +214,9 @@ class Shell(Generic[E, A]):
             for task in tasks:
                 task.cancel()
             await asyncio.gather(*tasks, return_exceptions=True)
-            for timer in (self._timer, self._gathering):
-                if timer is not None:
-                    timer.cancel()
+            self._alarm.ring_at(None)
+            if self._gathering is not None:
+                self._gathering.cancel()
 
     def step(self, event: E) -> None:
         """Step the core and carry out what it wants; call from the loop's thread.
@@ -362,15 +359,7 @@ class Shell(Generic[E, A]):
         self._bus.subscribe(key_expr, latest=True, gathered=self._gathering is not None)
 
     def _reschedule(self) -> None:
-        self._ring_at(self._core.next_deadline_s())
-
-    def _ring_at(self, deadline_s: float | None) -> None:
-        if self._timer is not None:
-            self._timer.cancel()
-            self._timer = None
-        if deadline_s is not None and not self._done.done():
-            delay_s = self._clock.wall_delay_s(deadline_s - self._clock.now_s())
-            self._timer = self._loop.call_later(max(0.0, delay_s), self._tick)
+        self._alarm.ring_at(None if self._done.done() else self._core.next_deadline_s())
 
     def step_in_turn(self, event: E) -> None:
         """Step the core with ``event`` and what is due, once others in this process had their turn.
@@ -379,20 +368,10 @@ class Shell(Generic[E, A]):
         Of several events that wait for their turn it hears the last; call from the loop's thread.
         """
         self._put_off = event
-        self._tick()
+        self._alarm.ring()
 
-    def _tick(self) -> None:
-        pressing_s, now_s = self._pressing_s(), self._clock.now_s()
-        if self._turns is None or (pressing_s is not None and pressing_s <= now_s):
-            self._take_turn()
-            return
-        if not self._waits_for_turn:
-            self._waits_for_turn = True
-            self._turns.put_off(self._take_turn)
-        self._ring_at(pressing_s)
-
-    def _take_turn(self) -> None:
-        self._waits_for_turn = False
+    def _look(self) -> None:
+        """Hear what has come, then what was put off, or see to what is due."""
         if self._done.done():
             return
         self.gather()

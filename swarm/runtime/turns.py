@@ -12,6 +12,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from swarm.protocol.shared_messages import SharedMessages
+from swarm.runtime.clock import Clock
 
 
 class Turns:
@@ -41,6 +42,57 @@ class Turns:
             self._waiting.popleft()
             if self._waiting:
                 asyncio.get_running_loop().call_soon(self._take_one)
+
+
+class Alarm:
+    """Has one of several shells look at what is due: at once if that presses, else in its turn.
+
+    Args:
+        clock: gives the times below.
+        turns: of all in this process; None: it is alone there, and never waits.
+        pressing_s: when something is due next that can't wait until others have had their turn;
+            None: nothing is, as far as is known.
+        look: is called from the loop; must not raise.
+    """
+
+    def __init__(
+        self,
+        clock: Clock,
+        turns: Turns | None,
+        pressing_s: Callable[[], float | None],
+        look: Callable[[], None],
+    ) -> None:
+        self._loop = asyncio.get_running_loop()
+        self._clock = clock
+        self._turns = turns
+        self._pressing_s = pressing_s
+        self._look = look
+        self._timer: asyncio.TimerHandle | None = None
+        self._waits = False
+
+    def ring_at(self, due_s: float | None) -> None:
+        """Something is due by then, and nothing before; None: nothing."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if due_s is not None:
+            delay_s = self._clock.wall_delay_s(due_s - self._clock.now_s())
+            self._timer = self._loop.call_later(max(0.0, delay_s), self.ring)
+
+    def ring(self) -> None:
+        """Something is due, or there is something that may be looked at along with it."""
+        pressing_s = self._pressing_s()
+        if self._turns is None or (pressing_s is not None and pressing_s <= self._clock.now_s()):
+            self._look()
+            return
+        if not self._waits:
+            self._waits = True
+            self._turns.put_off(self._take_turn)
+        self.ring_at(pressing_s)
+
+    def _take_turn(self) -> None:
+        self._waits = False
+        self._look()
 
 
 @dataclass(frozen=True, slots=True)
