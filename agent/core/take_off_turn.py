@@ -10,9 +10,10 @@ from __future__ import annotations
 import math
 
 from agent.core.context import AgentContext, AgentPart
+from swarm.kernels.motions import least_distance_m
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import UavSpec
-from swarm.separation.tactical_motion import column_m, least_distance_m
+from swarm.separation.tactical_motion import column_m
 from swarm.separation.tactical_traffic import TrafficPicture, TrafficRules
 
 ORDER_S = 60.0

@@ -16,12 +16,13 @@ import numpy as np
 import numpy.typing as npt
 
 from coordinator.mission_view.approaches import Fix
+from swarm.kernels.motions import meetings
 from swarm.protocol.fields import Point
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.registers import Replica
 from swarm.protocol.uav_messages import Claim
 from swarm.separation.straight_pieces import still_ahead
-from swarm.separation.tactical_motion import STEP_S, meetings
+from swarm.separation.tactical_motion import STEP_S
 from swarm.separation.tactical_rules import rules_of
 from swarm.separation.tactical_traffic import (
     Grade,

@@ -1006,3 +1006,37 @@ def drape_paths(
     Annotated[NDArray[numpy.float64], dict(shape=(None, None))],
     Annotated[NDArray[numpy.int64], dict(shape=(None,))],
 ]: ...
+def sampled_motion(
+    position_m: Sequence[float],
+    velocity_m_s: Sequence[float],
+    path_m: Sequence[Sequence[float]],
+    speed_m_s: float,
+    acceleration_m_s2: float,
+    climb_m_s: float,
+    drive_s: float,
+    step_s: float,
+    steps: int,
+) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]: ...
+def meetings(
+    some_m: Annotated[
+        NDArray[numpy.float64],
+        dict(shape=(None, None, None), order="C", device="cpu", writable=False),
+    ],
+    others_m: Annotated[
+        NDArray[numpy.float64],
+        dict(shape=(None, None, None), order="C", device="cpu", writable=False),
+    ],
+) -> tuple[
+    Annotated[NDArray[numpy.float64], dict(shape=(None,))],
+    Annotated[NDArray[numpy.float64], dict(shape=(None,))],
+]: ...
+def least_distance_m(
+    some_m: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    others_m: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    flat_m: float,
+    upright_m: float,
+) -> float: ...

@@ -18,4 +18,5 @@ NB_MODULE(_kernels, module) {
     peckorder::bind_field_alone(module);
     peckorder::bind_field_insertion(module);
     peckorder::bind_ground(module);
+    peckorder::bind_motions(module);
 }

@@ -16,11 +16,11 @@ from enum import Enum
 
 import numpy as np
 
+from swarm.kernels.motions import least_distance_m
 from swarm.separation.tactical_look import WIDE_M, Other, pace_s
 from swarm.separation.tactical_motion import (
     STEP_S,
     Place,
-    least_distance_m,
     least_meeting_m,
     motion_m,
     round_m,

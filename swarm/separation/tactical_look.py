@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from functools import cached_property
 
-from swarm.separation.tactical_motion import FloatArray, stray_m
+from swarm.kernels.motions import FloatArray
+from swarm.separation.tactical_motion import stray_m
 from swarm.separation.tactical_reach import Cylinder, reach
 from swarm.separation.tactical_traffic import (
     Grade,

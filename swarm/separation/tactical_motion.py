@@ -11,15 +11,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-FloatArray = npt.NDArray[np.float64]
+from swarm.kernels.motions import FloatArray, meetings, sampled_motion
+
 Place = tuple[float, float, float]
 """[m; mission origin, height included]."""
 
 STEP_S = 0.25
 """Between two samples of a motion [s]."""
-_REACHED_M = 0.5
 _COLUMN_STEP_M = 1.0
 _BESIDE_M = 1.0
 """Whoever is that near in the view from above is not flown round: it is above or below."""
@@ -71,41 +70,10 @@ def motion_m(
     Returns:
         Shape (samples, 3) [m].
     """
-    (px, py, pz), (vx, vy, vz) = position_m, velocity_m_s
-    change_m_s = agility.acceleration_m_s2 * STEP_S
-    corner, last = 0, len(path_m) - 1
-    places = [(px, py, pz)]
-    for step in range(math.ceil(span_s / STEP_S)):
-        wx = wy = wz = 0.0
-        if step * STEP_S < drive_s and path_m:
-            tx, ty, tz = path_m[corner]
-            away_m = math.sqrt((tx - px) ** 2 + (ty - py) ** 2 + (tz - pz) ** 2)
-            near_m = max(_REACHED_M, STEP_S * math.sqrt(vx * vx + vy * vy + vz * vz))
-            while corner < last and away_m <= near_m:
-                corner += 1
-                tx, ty, tz = path_m[corner]
-                away_m = math.sqrt((tx - px) ** 2 + (ty - py) ** 2 + (tz - pz) ** 2)
-            if away_m > 1e-6:
-                pace_m_s = speed_m_s
-                if corner == last:
-                    slowing_m_s = math.sqrt(2.0 * agility.acceleration_m_s2 * away_m)
-                    pace_m_s = min(pace_m_s, slowing_m_s, away_m / STEP_S)
-                if (steep_m := abs(tz - pz)) > 1e-6:
-                    pace_m_s = min(pace_m_s, agility.climb_m_s * away_m / steep_m)
-                share = pace_m_s / away_m
-                wx, wy, wz = share * (tx - px), share * (ty - py), share * (tz - pz)
-        ax, ay, az = wx - vx, wy - vy, wz - vz
-        wanted_m_s = math.sqrt(ax * ax + ay * ay + az * az)
-        if wanted_m_s > change_m_s:
-            share = change_m_s / wanted_m_s
-            ax, ay, az = share * ax, share * ay, share * az
-        # The mean of the speeds before and after, as it changes evenly.
-        px += STEP_S * (vx + 0.5 * ax)
-        py += STEP_S * (vy + 0.5 * ay)
-        pz += STEP_S * (vz + 0.5 * az)
-        vx, vy, vz = vx + ax, vy + ay, vz + az
-        places.append((px, py, pz))
-    return np.array(places)
+    steps = math.ceil(span_s / STEP_S)
+    fast_m_s2, climb_m_s = agility.acceleration_m_s2, agility.climb_m_s
+    flown = position_m, velocity_m_s, path_m, speed_m_s
+    return sampled_motion(*flown, fast_m_s2, climb_m_s, drive_s, STEP_S, steps)
 
 
 def stop_place_m(
@@ -163,48 +131,6 @@ def stray_m(age_s: float, speed_m_s: float, agility: Agility) -> tuple[float, fl
     return flat_m, upright_m
 
 
-def least_distance_m(
-    some_m: FloatArray, others_m: FloatArray, stray_m: tuple[float, float] = (0.0, 0.0)
-) -> float:
-    """Between any place of the one and any of the other [m].
-
-    Args:
-        some_m: (n, 3).
-        others_m: (m, 3).
-        stray_m: how far from these places the others may be, flat and upright.
-    """
-    apart_m = some_m[:, None, :] - others_m[None, :, :]
-    flat_m = np.hypot(apart_m[..., 0], apart_m[..., 1])
-    upright_m = np.abs(apart_m[..., 2])
-    if any(stray_m):
-        flat_m = np.maximum(0.0, flat_m - stray_m[0])
-        upright_m = np.maximum(0.0, upright_m - stray_m[1])
-    return float(np.min(np.hypot(flat_m, upright_m)))
-
-
 def least_meeting_m(some_m: FloatArray, others_m: FloatArray) -> float:
     """Between places of the same moment [m]; both of shape (samples, 3)."""
     return float(meetings(some_m[None], others_m[None])[0][0])
-
-
-def meetings(some_m: FloatArray, others_m: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """When pairs of motions are nearest, and how near.
-
-    Between two samples both are taken to move evenly, so that nobody slips through.
-
-    Args:
-        some_m: (n, samples, 3) places at the same moments as
-        others_m: (n, samples, 3).
-
-    Returns:
-        (n,) distances [m], and (n,) when, in samples from the first.
-    """
-    apart_m = some_m - others_m
-    steps_m = np.diff(apart_m, axis=1)
-    length2 = np.maximum(np.einsum("nij,nij->ni", steps_m, steps_m), 1e-12)
-    share = np.clip(-np.einsum("nij,nij->ni", apart_m[:, :-1], steps_m) / length2, 0.0, 1.0)
-    nearest_m = apart_m[:, :-1] + share[..., None] * steps_m
-    square = np.einsum("nij,nij->ni", nearest_m, nearest_m)
-    step = square.argmin(axis=1)
-    rows = np.arange(len(square))
-    return np.sqrt(square[rows, step]), step + share[rows, step]

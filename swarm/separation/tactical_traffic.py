@@ -13,10 +13,10 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
+from swarm.kernels.motions import FloatArray
 from swarm.separation.tactical_motion import (
     STEP_S,
     Agility,
-    FloatArray,
     Place,
     column_m,
     motion_m,

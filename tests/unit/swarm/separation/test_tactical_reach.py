@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarm.kernels.motions import FloatArray, least_distance_m
 from swarm.separation.tactical import OwnFlight, TacticalResolver
 from swarm.separation.tactical_motion import (
     STEP_S,
     Agility,
-    FloatArray,
     Place,
-    least_distance_m,
     motion_m,
 )
 from swarm.separation.tactical_reach import Cylinder, reach
