@@ -33,7 +33,7 @@ from sim.fleet.run import Run, open_run
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.encoding import NAMES
 from swarm.protocol.events import CommonAction, CommonEvent, MessageReceived
-from swarm.protocol.messages import MissionPhase
+from swarm.protocol.messages import MissionPhase, Stamp
 from swarm.protocol.timing import LinkKind
 from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
 from swarm.runtime.clock import SystemClock
@@ -108,6 +108,8 @@ class ScaleRun:
     """The nearest that two in flight came to each other until then; None: never two were."""
     nearest_error_m: float | None = None
     """How far that may be off: large fleets tell where they are every second or less often."""
+    new_claims_hz: float = 0.0
+    """Claims of each UAV that say anything new."""
 
     @property
     def agent_cpu_frac(self) -> float:
@@ -135,8 +137,16 @@ class ScaleRun:
 
         None: nobody decided while it was watched.
         """
+        return self._for_each_decision(self.published_hz.get(NAMES[Claim], 0.0))
+
+    @property
+    def new_claims_per_decision(self) -> float | None:
+        """Those of them that said anything new."""
+        return self._for_each_decision(self.new_claims_hz)
+
+    def _for_each_decision(self, hz: float) -> float | None:
         decisions_hz = self.published_hz.get(NAMES[Choice], 0.0)
-        return self.published_hz.get(NAMES[Claim], 0.0) / decisions_hz if decisions_hz else None
+        return hz / decisions_hz if decisions_hz else None
 
     @property
     def besides_hz(self) -> float:
@@ -152,7 +162,7 @@ class ScaleRun:
         """Everything, with what follows from it."""
         derived = (
             *("agent_cpu_frac", "agent_share_mean_bytes", "said_hz", "heard_hz"),
-            *("besides_hz", "claims_per_decision"),
+            *("besides_hz", "claims_per_decision", "new_claims_per_decision"),
         )
         return {
             **asdict(self),
@@ -223,6 +233,7 @@ class ScaleBench(BenchResult):
             *(Column("p50", ".1f", "ms"), Column("p99", ".1f", "ms")),
             *(Column("told p50", ".1f", "ms"), Column("told p99", ".1f", "ms")),
             Column("claims each", ".1f", none="-"),
+            Column("new", ".1f", none="-"),
             Column("heard besides", ".1f", "/s"),
         )
         rows = [
@@ -230,7 +241,7 @@ class ScaleBench(BenchResult):
                 *(run.uavs, max(len(run.latency_ms), len(run.told_ms))),
                 *(run.latency_quantile_ms(share) for share in (0.5, 0.99)),
                 *(quantile(run.told_ms, share) for share in (0.5, 0.99)),
-                *(run.claims_per_decision, run.besides_hz),
+                *(run.claims_per_decision, run.new_claims_per_decision, run.besides_hz),
             )
             for run in self.runs
         ]
@@ -284,6 +295,10 @@ class MessageCount:
     def __init__(self) -> None:
         self.heard: Counter[tuple[bool, str]] = Counter()
         """By whether a UAV has said so, and by kind."""
+        self.new_claims = 0
+        """Claims that were no repetition."""
+        self._claimed: dict[str, Stamp] = {}
+        """By UAV, the newest of its claims."""
         self.there: set[str] = set()
         """UAVs that have told their status."""
         self.latency_ms: list[float] = []
@@ -305,6 +320,11 @@ class MessageCount:
             self.heard[said.writer != COORDINATOR, NAMES[type(said.body)]] += 1
             if isinstance(said.body, Status):
                 self.there.add(said.writer)
+            elif isinstance(said.body, Claim):
+                before = self._claimed.get(said.writer)
+                if before is None or before < said.stamp:
+                    self.new_claims += 1
+                    self._claimed[said.writer] = said.stamp
 
     def log(self, name: str, line: str, now_s: float) -> None:
         """Take from a line of a log what it tells of decisions."""
@@ -357,10 +377,11 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
             )
             airborne_s = clock.now_s() - begun_s if runs else None
             tell(f"{n_uav} UAVs: flying")
-            heard, used, at_s = count.heard.copy(), _used_s(run), clock.now_s()
+            heard, new, used = count.heard.copy(), count.new_claims, _used_s(run)
+            at_s = clock.now_s()
             await asyncio.sleep(settings.watch_s)  # what one does that never takes off is told, too
             watched_s = clock.now_s() - at_s
-            said = count.heard - heard
+            said, new_claims = count.heard - heard, count.new_claims - new
             shares = tuple(
                 share_bytes(child.pid) // agents
                 for child in _living(run)
@@ -388,6 +409,7 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
         load=os.getloadavg()[0],
         nearest_m=None if near is None else near.distance_m,
         nearest_error_m=None if near is None else near.error_m,
+        new_claims_hz=new_claims / n_uav / watched_s,
     )
 
 

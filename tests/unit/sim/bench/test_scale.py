@@ -58,6 +58,7 @@ SMALL = ScaleRun(
     agent_share_bytes=(20_000_000, 30_000_000),
     published_hz={"status": 5.0, "claim": 0.5, "choice": 0.25},
     received_hz={"claim": 0.5, "epoch": 0.5},
+    new_claims_hz=0.375,
     latency_ms=(1.0, 2.0, 30.0),
     told_ms=(3.0, 4.0, 50.0),
     lost=0,
@@ -122,6 +123,17 @@ def test_a_decision_is_timed_until_an_observer_has_heard_what_is_claimed_next() 
     assert count.claim_delays.told_ms == [pytest.approx(30.0)]
 
 
+def test_claims_that_are_only_repeated_are_told_apart() -> None:
+    count = MessageCount()
+    state = MissionState(mission([uav("u0"), uav("u1")], [task("t0", 1.0)]), TIMING)
+    core = count.around(state, state)
+    core.start(0.0)
+    for writer, number in (("u0", 1), ("u1", 1), ("u0", 1), ("u0", 2), ("u0", 1)):
+        core.step(MessageReceived(message(writer, IDLE, number)), 0.0)
+
+    assert (count.new_claims, count.heard[True, "claim"]) == (3, 5)
+
+
 def test_decisions_are_timed_by_what_agents_log() -> None:
     count = MessageCount()
     said = {"event": TURNAROUNDS, "target_ms": [1.5, 2.5], "in_force_ms": [], "idled": 0}
@@ -139,6 +151,7 @@ def test_what_follows_from_the_figures_is_told_with_them() -> None:
     assert first["agent_share_mean_bytes"] == 25e6
     assert (first["said_hz"], first["heard_hz"]) == (5.75, 1.0)
     assert (first["claims_per_decision"], first["besides_hz"]) == (2.0, 0.5)
+    assert first["new_claims_per_decision"] == 1.5
     assert (first["latency_p50_ms"], first["latency_p99_ms"]) == (2.0, 30.0)
     assert second["latency_p99_ms"] is None
     assert (first["told_p50_ms"], first["told_p99_ms"]) == (4.0, 50.0)
