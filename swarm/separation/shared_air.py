@@ -415,9 +415,8 @@ class SharedAir:
         """Who asks for a way that meets ``uav`` where it is, the strongest first."""
         found = [
             other
-            for other in self._ways.near(here, claims)
+            for other in self._ways.asking_near(here, claims)
             if other != uav
-            and other in self._ways.asking
             and other not in expired
             and not apart(self.slabs, here, self.wanted(other, self.way(other, claims)))
         ]

@@ -100,6 +100,14 @@ class TakenWays:
         beyond |= self._boxes_m[:, 1] < low_m - self._near_m
         return [self.uavs[row] for row in np.flatnonzero(~beyond.any(axis=1))]
 
+    def asking_near(self, path: Path, claims: Mapping[str, Claim]) -> list[str]:
+        """Of those `near` it who asks for a way, and waits; mostly they are few."""
+        self.look_at(claims)
+        if not self.asking:
+            return []
+        near = self.near(path, claims)
+        return [uav for uav in near if uav in self.asking]
+
     def look_at(self, claims: Mapping[str, Claim]) -> None:
         """Find out what has changed: from word to word, and from agent to agent, it is little."""
         now, before = list(map(claims.get, self.uavs)), self._seen

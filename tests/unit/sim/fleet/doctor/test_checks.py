@@ -136,8 +136,8 @@ def test_a_machine_is_judged_by_the_fleet_it_is_to_carry() -> None:
         CheckState.WARNING,
         CheckState.WARNING,
     ]
-    assert states(*check_limits(small, 20)) == [CheckState.OK] * 3
-    assert states(*check_limits(small, 20, keeps_apart=True)) == [
+    assert states(*check_limits(small, 40)) == [CheckState.OK] * 3
+    assert states(*check_limits(small, 40, keeps_apart=True)) == [
         CheckState.OK,
         CheckState.WARNING,
         CheckState.OK,
