@@ -19,6 +19,8 @@ Place = tuple[float, float, float]
 
 STEP_S = 0.25
 """Between two samples of a motion [s]."""
+_LONGEST_S = 25_000.0
+"""As long as the motion of a UAV is looked at that hardly brakes at all [s]."""
 _COLUMN_STEP_M = 1.0
 _BESIDE_M = 1.0
 """Whoever is that near in the view from above is not flown round: it is above or below."""
@@ -65,12 +67,12 @@ def motion_m(
         speed_m_s: cruise speed.
         agility: how it speeds up, brakes and climbs.
         drive_s: after that it brakes, wherever it is.
-        span_s: until when.
+        span_s: until when, if that is no longer than hours.
 
     Returns:
         Shape (samples, 3) [m].
     """
-    steps = math.ceil(span_s / STEP_S)
+    steps = math.ceil(min(span_s, _LONGEST_S) / STEP_S)
     fast_m_s2, climb_m_s = agility.acceleration_m_s2, agility.climb_m_s
     flown = position_m, velocity_m_s, path_m, speed_m_s
     return sampled_motion(*flown, fast_m_s2, climb_m_s, drive_s, STEP_S, steps)

@@ -74,6 +74,14 @@ def test_the_least_distance_is_as_defined(
     assert least_distance_m(some_m, others_m, stray_m) == pytest.approx(expected_m, abs=1e-9)
 
 
+def test_who_hardly_brakes_is_looked_at_for_hours_and_not_for_ever() -> None:
+    here_m, east_m_s = (0.0, 0.0, 30.0), (10.0, 0.0, 0.0)
+    way_m = motion_m(here_m, east_m_s, (), 10.0, Agility(1e-6), math.inf, 10.0 / 1e-6)
+
+    assert way_m.shape == (100_001, 3)
+    assert way_m[-1, 0] == pytest.approx(250_000.0, rel=0.01)
+
+
 NAN, HERE = (math.nan, 0.0, 0.0), (0.0, 0.0, 0.0)
 
 
