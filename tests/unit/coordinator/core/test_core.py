@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from coordinator.core.lifecycle import Withdraw
+from coordinator.core.lifecycle import CoordinatorAction, Withdraw
+from coordinator.core.stages import StagedMission
 from swarm.model.ids import COORDINATOR, OPERATOR
 from swarm.model.layers import FlightLayers
 from swarm.protocol.events import (
@@ -35,6 +36,7 @@ from tests.support.builders import (
     held,
     message,
     mission,
+    status,
     task,
     uav,
 )
@@ -62,6 +64,31 @@ def test_a_pop_up_is_posted_on_time_and_once() -> None:
     (entry,) = said(coordinator.run_until(130.1), TaskEntry)
     assert (entry.task, entry.number) == ("popup", 0)
     assert said(coordinator.run_until(200.0), TaskEntry) == []
+
+
+def test_statuses_of_who_is_there_change_nothing_until_something_is_due(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    looks = list[float]()
+    looks_at = StagedMission.advance
+
+    def counted(self: StagedMission, now_s: float) -> list[CoordinatorAction]:
+        looks.append(now_s)
+        return looks_at(self, now_s)
+
+    coordinator = LoneCoordinator(mission([U0, U1], [POPUP, T0])).started()
+    monkeypatch.setattr(StagedMission, "advance", counted)
+    how_it_is = MessageReceived(message("u0", status()))
+    coordinator.happen(how_it_is, 110.0)
+    assert looks == []
+    coordinator.happen(MessageReceived(message("nobody knows it", status())), 110.1)
+    assert looks == [110.1]
+
+    coordinator.run_until(129.9)
+    due_s = coordinator.core.next_deadline_s()
+    assert due_s is not None
+    (entry,) = said(coordinator.happen(how_it_is, due_s), TaskEntry)
+    assert entry.task == "popup"
 
 
 def test_a_pop_up_is_posted_at_its_deadline_whatever_the_rounding() -> None:

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import asyncio
+from functools import partial
+
+import pytest
 
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.encoding import encode
@@ -69,10 +72,12 @@ def test_what_is_due_waits_for_others_but_not_what_presses() -> None:
             assert core.heard == ([PLACE, NEWS] if presses else [NEWS, PLACE])
 
     for presses in (False, True):
-        play(lambda presses=presses: scenario(presses))  # type: ignore[misc]
+        play(partial(scenario, presses))
 
 
-def test_what_comes_to_press_while_it_waits_for_its_turn_is_done_then() -> None:
+def test_what_comes_to_press_while_it_waits_for_its_turn_is_done_then(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     async def scenario() -> None:
         shared, turns_left = SharedProcess(), 1000
 
@@ -87,7 +92,7 @@ def test_what_comes_to_press_while_it_waits_for_its_turn_is_done_then() -> None:
             turns_left -= 1
 
         async with at_work(core, shared=shared, pressing_s=lambda: 1.0) as played:
-            played.clock.wall_delay_s = lambda delay_s: 0.0 * delay_s  # type: ignore[method-assign]
+            monkeypatch.setattr(played.clock, "wall_delay_s", lambda _: 0.0)
             await asyncio.sleep(0)
             for _ in range(turns_left):
                 shared.turns.put_off(others)
