@@ -15,7 +15,7 @@ from swarm.protocol.events import Publish
 from swarm.protocol.messages import MissionConfig, MissionPhase, Snapshot
 from swarm.protocol.registers import Replica, snapshot_without
 from swarm.protocol.timing import Timing
-from swarm.protocol.uav_messages import ClaimPhase, Status
+from swarm.protocol.uav_messages import ClaimPhase, News
 
 
 class RecoveredState:
@@ -131,4 +131,4 @@ class SaveCondition:
 
 
 def _is_register(action: Action) -> bool:
-    return isinstance(action, Publish) and not isinstance(action.message.body, Status)
+    return isinstance(action, Publish) and not isinstance(action.message.body, News)

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from agent.core.interface import Action
+from agent.core.verticals import Verticals
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import (
     Ask,
@@ -22,7 +23,7 @@ from swarm.protocol.events import (
 from swarm.protocol.messages import Body, Snapshot, TaskEntry
 from swarm.protocol.sync import MOST_OPEN
 from swarm.protocol.timing import Timing
-from swarm.protocol.uav_messages import ClaimPhase, Outcome, Status, StatusPhase
+from swarm.protocol.uav_messages import Claim, ClaimPhase, Nearby, Outcome, Status, StatusPhase
 from tests.support.builders import (
     IDLE,
     MISSION,
@@ -477,3 +478,23 @@ def test_its_memory_holds_what_everyone_has_said() -> None:
     assert memory.mission_s == 7.0
     assert {message.writer for message in memory.messages} == {"u0", "u1", COORDINATOR}
     assert memory.messages == tuple(agent.core.replica.messages())
+
+
+def test_what_it_tells_those_near_it_many_times_a_second_keeps_nothing() -> None:
+    """Each of these would be a write to the disk in a fleet where somebody decides all along."""
+    theirs = [entry(f"t{n}", 9000.0 + n, number=n) for n in range(9)]
+    agent = LoneAgent(uav("u0"), uav("u1", east_m=500.0), verticals=Verticals())
+    agent.brief = replace(agent.brief, separation_m=5.0)
+    agent.fly_to(entry("far", east_m=5000.0), *theirs)
+    agent.start_mission()
+    agent.run_until(2.0)
+    told = len(agent.log)
+    for number in range(9):
+        agent.hear("u1", done(f"t{number}"))
+        agent.be_at((20.0 + number, 0.0, 10.0))
+        agent.run_until(2.0 + 0.2 * number)
+
+    said = [each.message.body for each in agent.log[told:] if isinstance(each, Publish)]
+    assert sum(isinstance(body, Nearby) for body in said) >= 2
+    assert not any(isinstance(body, Claim) for body in said)
+    assert saves(agent.log[told:]) == 0
