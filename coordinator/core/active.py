@@ -123,8 +123,8 @@ class CoordinatorCore:
         self._handle(event, now_s)
         if not self._mission.is_over and not waits:
             self._give_up_lost(now_s)
-            if not self._state_query.unsure:
-                self._actions += self._mission.advance(now_s)
+            unsure = self._state_query.unsure
+            self._actions += (self._mission.wait if unsure else self._mission.advance)(now_s)
         return self._conclude(now_s)
 
     def next_deadline_s(self) -> float | None:
@@ -132,8 +132,7 @@ class CoordinatorCore:
         if self._mission.is_over:
             return None
         deadlines = [self._state_query.next_deadline_s(), self._membership.next_deadline_s()]
-        if not self._state_query.unsure:  # what it would do waits until it knows more
-            deadlines += self._mission.deadlines_s()
+        deadlines += self._mission.deadlines_s(unsure=self._state_query.unsure)
         return earliest(*deadlines)
 
     def snapshot(self, now_s: float) -> Snapshot:

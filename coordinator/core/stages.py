@@ -130,9 +130,12 @@ class StagedMission:
         """Whether this coordinator is in charge of it, or was until everybody had left."""
         return self.stage not in (MissionStage.LEARNING, MissionStage.LEFT)
 
-    def deadlines_s(self) -> Iterator[float | None]:
-        """All that is waited for in this stage."""
-        yield self._announcer.next_deadline_s()
+    def deadlines_s(self, *, unsure: bool = False) -> Iterator[float | None]:
+        """All that is waited for in this stage, or while ``unsure`` of what others know."""
+        if not unsure or self.stage is MissionStage.BRIEFED:
+            yield self._announcer.next_deadline_s()
+        if unsure:
+            return
         match self.stage:
             case MissionStage.BRIEFED:
                 yield self.gate.next_deadline_s()
@@ -176,6 +179,14 @@ class StagedMission:
         if not self.is_over:
             actions += self._announcer.repeat(now_s)
         return actions
+
+    def wait(self, now_s: float) -> list[CoordinatorAction]:
+        """Do what is due while it is unsure what others know, which is to decide nothing.
+
+        Before the start, while a large fleet joins, it is so all along: then it says what it has
+        said, or those who have joined would take it for lost.
+        """
+        return list(self._announcer.repeat(now_s)) if self.stage is MissionStage.BRIEFED else []
 
     def brief(self, now_s: float) -> list[CoordinatorAction]:
         """Say what there is to say before the fleet takes off, and plan for all of it.

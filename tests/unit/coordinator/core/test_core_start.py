@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
 from coordinator.core.lifecycle import PlanFailed, PlanMade
 from swarm.protocol.codec import Codec
 from swarm.protocol.encoding import encode
 from swarm.protocol.events import (
+    PeerSeen,
     Stop,
 )
 from swarm.protocol.messages import (
@@ -16,6 +19,7 @@ from swarm.protocol.messages import (
     PlanEpoch,
     TaskEntry,
 )
+from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import StatusPhase
 from tests.support.builders import (
     IDLE,
@@ -198,3 +202,20 @@ def test_answers_to_an_older_request_mean_nothing() -> None:
     coordinator.happen(PlanMade(1, plan_of(TRIO, "u0", "u1", "u2")))
 
     assert coordinator.epoch is None
+
+
+def test_it_speaks_on_while_so_many_join_that_it_never_knows_all_they_know() -> None:
+    """Who says nothing for so long would be taken for lost by all who have joined."""
+    uavs = [uav(f"u{number:02}") for number in range(40)]
+    timing = Timing()
+    coordinator = LoneCoordinator(mission(uavs, [T0, T1]), timing=timing)
+    coordinator.answers = None  # each comes before the question about the last one is answered
+    spoke_s, begun_s = [coordinator.now_s], coordinator.now_s
+    for number, each in enumerate(uavs):
+        actions = coordinator.happen(PeerSeen(each.id), begun_s + 0.5 * number)
+        actions += coordinator.run_until(begun_s + 0.5 * (number + 1))
+        if said(actions, MissionConfig) or said(actions, TaskEntry):
+            spoke_s.append(coordinator.now_s)
+
+    assert max(np.diff([*spoke_s, coordinator.now_s])) < timing.silence_s / 2
+    assert said(coordinator.log, PlanEpoch) == []  # and decides nothing meanwhile
