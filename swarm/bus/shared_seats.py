@@ -42,6 +42,9 @@ MOST_WAITING: Final = 8192
 """Samples of one seat that wait to be gathered."""
 _GATHER_S: Final = 0.005
 """Between two looks at what waits on the bus, whichever seats want it: there are dozens."""
+_SAY_S: Final = 0.005
+"""So much later is said what may be lost, such as where UAVs are: to wake the thread that says it
+for each word would cost more than the words."""
 _MOST_KEYS: Final = 4096
 """Keys of which is kept by what they are subscribed to."""
 
@@ -90,6 +93,8 @@ class SharedSeats:
         self._dropped = 0
         self._gathered_s = -math.inf
         """When the bus was last asked for what waits, in the loop's time."""
+        self._unsaid: list[Sample] = []
+        """What is to be said on the bus with the next that must not be lost, or soon."""
 
     async def seat(self, *, inbox_capacity: int = 4096) -> SharedSeat:
         """One more seat.
@@ -122,6 +127,7 @@ class SharedSeats:
 
     def leave(self, seat: SharedSeat) -> None:
         """Nobody sits there any more."""
+        self._say_unsaid()
         self._seats.remove(seat)
         if not self._seats or self._bus is None:
             self._close()
@@ -176,9 +182,23 @@ class SharedSeats:
             self._subscribed[key_expr] = now
             self.bus.subscribe(key_expr, latest=latest, gathered=gathered)
 
-    def publish(self, seat: SharedSeat, sample: Sample) -> None:
-        """Hand round what ``seat`` says."""
+    def publish(self, seat: SharedSeat, sample: Sample, *, reliable: bool) -> None:
+        """Say on the bus and hand round what ``seat`` says."""
+        if reliable:
+            self._say_unsaid()
+            self.bus.publish(sample.key, sample.payload)
+        else:
+            if not self._unsaid:
+                asyncio.get_running_loop().call_later(_SAY_S, self._say_unsaid)
+            self._unsaid.append(sample)
         self._hand_round(sample, but=seat)
+
+    def _say_unsaid(self) -> None:
+        unsaid, self._unsaid = self._unsaid, []
+        if self._bus is not None:
+            with contextlib.suppress(BusError):  # it ends, and all that was to be said may be lost
+                for sample in unsaid:
+                    self._bus.publish(sample.key, sample.payload, reliable=False)
 
     def gather(self) -> None:
         """Hand round what waits outside of the bus's inbox, if that was not done just now."""
@@ -304,9 +324,9 @@ class SharedSeat:
 
     def publish(self, key: str, payload: bytes, *, reliable: bool = True) -> None:
         """Say ``payload`` on ``key``; see `swarm.bus.port.Bus.publish`."""
+        self._open_bus()
         sample = Sample(check_key(key), bytes(check_payload(payload)))
-        self._open_bus().publish(key, sample.payload, reliable=reliable)
-        self._seats.publish(self, sample)
+        self._seats.publish(self, sample, reliable=reliable)
 
     def subscribe(self, key_expr: str, *, latest: bool = False, gathered: bool = False) -> None:
         """Receive a `Sample` for everything others publish on ``key_expr``."""

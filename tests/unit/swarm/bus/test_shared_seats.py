@@ -154,6 +154,53 @@ def test_what_comes_is_admitted_once_for_all_seats(gathered: bool) -> None:
     play(scenario)
 
 
+def said_on(other: MemoryBus) -> list[tuple[str, bytes]]:
+    """Since it was asked last."""
+    return [(s.key, s.payload) for s in other.inbox.take() if isinstance(s, Sample)]
+
+
+def test_what_may_get_lost_is_said_in_its_turn_with_what_must_not_and_when_a_seat_is_left() -> None:
+    async def scenario(seats: SharedSeats, opened: list[RecordedBus]) -> None:
+        a, b, c = await three(seats)
+        b.subscribe("**")
+        other = opened[0].network.join("another process")
+        other.subscribe("**")
+        await settled()
+
+        a.publish("where/a", b"1", reliable=False)
+        c.publish("where/c", b"2", reliable=False)
+        await settled()
+        words = [("where/a", b"1"), ("where/c", b"2")]
+        assert [(s.key, s.payload) for s in b.inbox.take() if isinstance(s, Sample)] == words
+        assert said_on(other) == []
+        b.publish("claim/b", b"3")
+        await settled()
+        assert said_on(other) == [*words, ("claim/b", b"3")]
+
+        a.publish("where/a", b"4", reliable=False)
+        a.close()
+        await settled()
+        assert said_on(other) == [("where/a", b"4")]
+
+    play(scenario)
+
+
+def test_what_may_get_lost_is_said_soon_though_nothing_else_is() -> None:
+    async def scenario(seats: SharedSeats, opened: list[RecordedBus]) -> None:
+        a, _, _ = await three(seats)
+        other = opened[0].network.join("another process")
+        other.subscribe("**")
+        await settled()
+        said_on(other)
+
+        a.publish("where/a", b"1", reliable=False)
+        await other.inbox.wait()
+
+        assert said_on(other) == [("where/a", b"1")]
+
+    play(scenario)
+
+
 def test_a_seat_that_is_left_is_seen_to_be_and_asks_for_nothing_more() -> None:
     async def scenario(seats: SharedSeats, opened: list[RecordedBus]) -> None:
         a, b, _ = await three(seats)
