@@ -40,7 +40,8 @@ from swarm.protocol.messages import Message, MissionConfig, Stamp
 from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import MOST_CORNERS_AHEAD, Nearby
 from swarm.separation.straight_pieces import off_piece_m
-from swarm.separation.tactical import Advice, Maneuver, OwnFlight, TacticalResolver
+from swarm.separation.tactical import TacticalResolver
+from swarm.separation.tactical_advice import Advice, Maneuver, OwnFlight
 from swarm.separation.tactical_rules import cell_around, cell_m, cells_near, rules_of
 from swarm.separation.tactical_traffic import (
     SILENT_S,
@@ -77,6 +78,8 @@ _STEERED = frozenset(
 )
 """In these its vehicle takes targets, and may be told to give way."""
 _BY_ITSELF = GiveWay()
+_GRADES = tuple(Grade)
+"""By number; to make one of its number takes as long as all else of a word."""
 
 
 class NearTraffic(AgentPart):
@@ -166,7 +169,7 @@ class NearTraffic(AgentPart):
             body.velocity_enu_m_s,
             body.path_enu_m,
             body.speed_m_s,
-            Precedence(Grade(body.grade), body.rank, body.depth),
+            Precedence(_GRADES[body.grade], body.rank, body.depth),
         )
         if self._picture.hear(writer, word, now_s, age_s) and self._rules is not None:
             self._decide_at_s = min(self._decide_at_s, now_s + self._rules.tick_s)

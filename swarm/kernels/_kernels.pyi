@@ -97,6 +97,38 @@ class TourTable:
         ],
     ) -> Annotated[NDArray[numpy.int64], dict(shape=(None,))]: ...
 
+class TrafficTable:
+    def __init__(self, rules: Sequence[float]) -> None: ...
+    def hear(
+        self,
+        number: int,
+        place_m: Sequence[float],
+        velocity_m_s: Sequence[float],
+        path_m: Sequence[Sequence[float]],
+        speed_m_s: float,
+        said_s: float,
+        precedence: Sequence[int],
+    ) -> None: ...
+    def forget(self, number: int) -> None: ...
+    def look(
+        self,
+        place_m: Sequence[float],
+        velocity_m_s: Sequence[float],
+        path_m: Sequence[Sequence[float]],
+        speed_m_s: float,
+        now_s: float,
+        precedence: Sequence[int],
+    ) -> tuple[bool, bool, bool]: ...
+    def is_close(
+        self,
+        place_m: Sequence[float],
+        velocity_m_s: Sequence[float],
+        path_m: Sequence[Sequence[float]],
+        speed_m_s: float,
+        now_s: float,
+        gives_way: bool,
+    ) -> tuple[bool, bool]: ...
+
 def good_tour(
     completion_s: Annotated[
         NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)

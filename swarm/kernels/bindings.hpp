@@ -21,5 +21,6 @@ void bind_rollout(nanobind::module_& module);
 void bind_routes(nanobind::module_& module);
 void bind_routes_pricing(nanobind::module_& module);
 void bind_tours(nanobind::module_& module);
+void bind_traffic(nanobind::module_& module);
 
 }  // namespace peckorder

@@ -5,6 +5,7 @@ NB_MODULE(_kernels, module) {
     module.doc() = "Compiled kernels; call them through the typed functions of swarm.kernels.";
     peckorder::bind_problem(module);
     peckorder::bind_tours(module);
+    peckorder::bind_traffic(module);
     peckorder::bind_long_tours(module);
     peckorder::bind_lower_level(module);
     peckorder::bind_exact(module);

@@ -15,19 +15,18 @@
 
 #include "arrays.hpp"
 #include "bindings.hpp"
+#include "motions.hpp"
 
 namespace peckorder {
 
-namespace {
+double length(const Vector& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
-using Vector = std::array<double, 3>;
+namespace {
 
 constexpr double kReachedM = 0.5;
 constexpr double kHereM = 1e-6;
 constexpr double kLevelM = 1e-6;
 constexpr int kMostSteps = 100000;  // hours
-
-double length(const Vector& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2]); }
 
 Vector between(const Vector& from, const Vector& to) {
     return {to[0] - from[0], to[1] - from[1], to[2] - from[2]};
@@ -73,32 +72,25 @@ struct Motion {
     }
 };
 
-Out<double, 2> sampled_motion(const Vector& position_m, const Vector& velocity_m_s,
-                              const std::vector<Vector>& path_m, double speed_m_s,
-                              double acceleration_m_s2, double climb_m_s, double drive_s,
-                              double step_s, int steps) {
-    require_finite("position_m", position_m.data(), 3);
-    require_finite("velocity_m_s", velocity_m_s.data(), 3);
-    for (const Vector& corner : path_m) require_finite("path_m", corner.data(), 3);
-    require_within("step_s", step_s, std::numeric_limits<double>::min(), 1e9, "positive");
-    require_within("steps", steps, 0, kMostSteps, "between 0 and 100000");
+}  // namespace
+
+std::vector<double> sampled(const Flight& flight, double acceleration, double climb, double drive_s,
+                            double step_s, int steps) {
     std::vector<double> places;
     places.reserve(3 * (static_cast<std::size_t>(steps) + 1));
-    Motion motion{position_m, velocity_m_s};
+    Motion motion{flight.place, flight.velocity};
     places.insert(places.end(), motion.place.begin(), motion.place.end());
     for (int step = 0; step < steps; ++step) {
-        const bool drives = !path_m.empty() && step * step_s < drive_s;
-        const Vector wanted = drives ? motion.wanted(path_m, speed_m_s, acceleration_m_s2,
-                                                     climb_m_s, step_s)
-                                     : Vector{0.0, 0.0, 0.0};
-        motion.advance(wanted, acceleration_m_s2 * step_s, step_s);
+        const bool drives = !flight.path.empty() && step * step_s < drive_s;
+        const Vector wanted =
+            drives ? motion.wanted(flight.path, flight.speed, acceleration, climb, step_s)
+                   : Vector{0.0, 0.0, 0.0};
+        motion.advance(wanted, acceleration * step_s, step_s);
         places.insert(places.end(), motion.place.begin(), motion.place.end());
     }
-    const std::size_t shape[2] = {places.size() / 3, 3};
-    return give<double, 2>(std::move(places), shape);
+    return places;
 }
 
-// Squared distance and, in samples from the first, the moment at which two motions are nearest.
 std::pair<double, double> nearest(const double* some, const double* others, std::size_t samples) {
     double least = std::numeric_limits<double>::infinity(), when = 0.0;
     for (std::size_t k = 0; k + 1 < samples; ++k) {
@@ -120,6 +112,44 @@ std::pair<double, double> nearest(const double* some, const double* others, std:
         }
     }
     return {least, when};
+}
+
+double least_squared(const double* some, std::size_t count, const double* others,
+                     std::size_t other_count, double flat_m, double upright_m) {
+    double least = std::numeric_limits<double>::infinity();
+    for (const double* one = some; one != some + 3 * count; one += 3) {
+        for (const double* it = others; it != others + 3 * other_count; it += 3) {
+            const double east = one[0] - it[0], north = one[1] - it[1], up = one[2] - it[2];
+            double flat2 = east * east + north * north, upright2 = up * up;
+            if (flat_m > 0.0) {
+                const double flat = std::max(0.0, std::sqrt(flat2) - flat_m);
+                flat2 = flat * flat;
+            }
+            if (upright_m > 0.0) {
+                const double upright = std::max(0.0, std::abs(up) - upright_m);
+                upright2 = upright * upright;
+            }
+            least = std::min(least, flat2 + upright2);
+        }
+    }
+    return least;
+}
+
+namespace {
+
+Out<double, 2> sampled_motion(const Vector& position_m, const Vector& velocity_m_s,
+                              const std::vector<Vector>& path_m, double speed_m_s,
+                              double acceleration_m_s2, double climb_m_s, double drive_s,
+                              double step_s, int steps) {
+    require_finite("position_m", position_m.data(), 3);
+    require_finite("velocity_m_s", velocity_m_s.data(), 3);
+    for (const Vector& corner : path_m) require_finite("path_m", corner.data(), 3);
+    require_within("step_s", step_s, std::numeric_limits<double>::min(), 1e9, "positive");
+    require_within("steps", steps, 0, kMostSteps, "between 0 and 100000");
+    auto places = sampled({position_m, velocity_m_s, path_m, speed_m_s}, acceleration_m_s2,
+                          climb_m_s, drive_s, step_s, steps);
+    const std::size_t shape[2] = {places.size() / 3, 3};
+    return give<double, 2>(std::move(places), shape);
 }
 
 void require_samples(const In<double, 3>& some, const In<double, 3>& others) {
@@ -153,23 +183,8 @@ double least_distance_m(const In<double, 2>& some, const In<double, 2>& others, 
     require_finite("others_m", others.data(), others.size());
     require_within("stray_m", flat_m, 0.0, std::numeric_limits<double>::max(), ">= 0");
     require_within("stray_m", upright_m, 0.0, std::numeric_limits<double>::max(), ">= 0");
-    double least = std::numeric_limits<double>::infinity();
-    for (const double* one = some.data(); one != some.data() + some.size(); one += 3) {
-        for (const double* it = others.data(); it != others.data() + others.size(); it += 3) {
-            const double east = one[0] - it[0], north = one[1] - it[1], up = one[2] - it[2];
-            double flat2 = east * east + north * north, upright2 = up * up;
-            if (flat_m > 0.0) {
-                const double flat = std::max(0.0, std::sqrt(flat2) - flat_m);
-                flat2 = flat * flat;
-            }
-            if (upright_m > 0.0) {
-                const double upright = std::max(0.0, std::abs(up) - upright_m);
-                upright2 = upright * upright;
-            }
-            least = std::min(least, flat2 + upright2);
-        }
-    }
-    return std::sqrt(least);
+    return std::sqrt(least_squared(some.data(), some.shape(0), others.data(), others.shape(0), flat_m,
+                                   upright_m));
 }
 
 }  // namespace

@@ -49,7 +49,6 @@ from swarm.protocol.messages import (
     roster_message,
 )
 from swarm.protocol.registers import NO_ROOM
-from swarm.protocol.seal import Seal
 from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind
 from swarm.protocol.uav_messages import News
 from swarm.runtime.clock import Clock
@@ -265,11 +264,10 @@ class Shell(Generic[E, A]):
         for action in self._core.start(self._clock.now_s()):
             self._carry_out(action)
         if self._seal is not None:  # what is in its folder is as if it had been heard
-            self._events.append(self._from_bus(MessageReceived(self._roster(self._seal))))
+            roster, signed = self._seal.roster, self._seal.signed_roster
+            said = roster_message(self._mission, roster.version, signed)
+            self._events.append(self._from_bus(MessageReceived(said)))
         self._step_all()
-
-    def _roster(self, seal: Seal) -> Message:
-        return roster_message(self._mission, seal.roster.version, seal.signed_roster)
 
     def _heed(self, messages: Iterable[Message], *, answers: bool = False) -> None:
         """Put a newer roster in force; who told an older one is told the newer."""
@@ -281,7 +279,8 @@ class Shell(Generic[E, A]):
                 continue
             behind = message.stamp.incarnation < seal.roster.version
             if behind and answers and not told and seal.may_publish_roster:
-                self._publish(self._roster(seal))
+                newest = seal.roster.version, seal.signed_roster
+                self._publish(roster_message(self._mission, *newest))
                 told = True  # once, however often the answer repeats an old one
             before = seal.roster
             try:
@@ -418,10 +417,14 @@ class Shell(Generic[E, A]):
     def _read(self, most: int) -> None:
         """Let the core hear the oldest that it has not, so many at most."""
         for _ in range(min(most, len(self._unread))):
-            fact = self._fact(self._unread.popleft())
-            if isinstance(fact, MessageReceived) and self._gathering is not None:
-                self._heard.append(fact.message)
-            elif fact is not None:
+            event = self._unread.popleft()
+            if isinstance(event, Sample):
+                message = self._message(event)
+                if message is not None and self._gathering is not None:
+                    self._heard.append(message)
+                elif message is not None:
+                    self.step(self._from_bus(MessageReceived(message)))
+            elif (fact := self._fact(event)) is not None:
                 self._tell_heard()
                 self.step(self._from_bus(fact))
         self._tell_heard()
@@ -433,8 +436,6 @@ class Shell(Generic[E, A]):
 
     def _tell_newer(self) -> None:
         """Tell people once of each kind: it is no fault to be of another release."""
-        if len(self._codec.newer) == len(self._told_newer):
-            return
         for kind in self._codec.newer - self._told_newer:
             self._told_newer.add(kind)
             self._log.info("a newer release says more than this one understands", kind=kind)
@@ -452,24 +453,24 @@ class Shell(Generic[E, A]):
             self._codec.dropped.update(news)
             self._counted = counts
 
+    def _message(self, sample: Sample) -> Message | None:
+        """What was said, if it is to be believed."""
+        message = self._codec.decode(sample.key, sample.payload, self._register(sample.key))
+        if message is None:
+            return None
+        self._tell_newer()
+        if isinstance(message.body, SignedRoster):
+            self._tell_heard()  # what came before was said before
+            self._heed([message])
+        elif isinstance(message.body, MissionConfig):
+            self._expect([message])
+        return message
+
     def _fact(self, event: BusEvent) -> CommonEvent | None:
         match event:
-            case Sample(key, payload):
-                message = self._codec.decode(key, payload, self._register(key))
-                if message is None:
-                    return None
-                self._tell_newer()
-                if isinstance(message.body, SignedRoster):
-                    self._tell_heard()  # what came before was said before
-                    self._heed([message])
-                elif isinstance(message.body, MissionConfig):
-                    self._expect([message])
-                return MessageReceived(message)
-            case TokenSeen(key):
-                writer = self._keys.writer_of_token(key)
-                if writer is not None:
-                    self._questions.there.add(writer)
-                return None if writer is None else PeerSeen(writer)
+            case TokenSeen(key) if (writer := self._keys.writer_of_token(key)) is not None:
+                self._questions.there.add(writer)
+                return PeerSeen(writer)
             case TokenGone(key):
                 writer = self._keys.writer_of_token(key)
                 self._questions.there.discard(writer or "")
@@ -480,7 +481,7 @@ class Shell(Generic[E, A]):
                 return LinkChanged(False)
             case Query(reply=reply, payload=payload):
                 self._questions.answer(reply, payload)
-                return None
+        return None
 
     def _expect(self, messages: Iterable[Message]) -> None:
         """Let no made-up names shut out whom a brief names."""

@@ -12,13 +12,14 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 
 from swarm.kernels.motions import least_distance_m
-from swarm.separation.tactical_look import WIDE_M, Other, pace_s
+from swarm.separation.tactical_advice import Advice, Maneuver, OwnFlight
+from swarm.separation.tactical_look import Other, pace_s
 from swarm.separation.tactical_motion import (
+    GRID_M,
     STEP_S,
     Place,
     least_meeting_m,
@@ -29,6 +30,7 @@ from swarm.separation.tactical_motion import (
 from swarm.separation.tactical_reach import reach
 from swarm.separation.tactical_traffic import (
     SILENT_S,
+    WIDE_M,
     Grade,
     NearbyTrack,
     Precedence,
@@ -36,55 +38,6 @@ from swarm.separation.tactical_traffic import (
     TrafficRules,
     TrafficWord,
 )
-
-
-class Maneuver(Enum):
-    """What a UAV does about those near it."""
-
-    KEEP = "keep"
-    """It flies as it would alone."""
-    SLOW = "slow"
-    HOLD = "hold"
-    OVER = "over"
-    """It flies on past another one: higher, lower or, where it can't, round it."""
-    ASIDE = "aside"
-    """It makes room."""
-
-
-@dataclass(frozen=True, slots=True)
-class OwnFlight:
-    """How a UAV flies by itself, and what would be next."""
-
-    position_enu_m: Place
-    velocity_enu_m_s: Place
-    path_enu_m: tuple[Place, ...]
-    """Corners ahead, then where it stops; empty: it hovers where it is, or is about to stop."""
-    speed_m_s: float
-    """At which it flies that."""
-    precedence: Precedence
-    """Its own."""
-    gives_way: bool = True
-    """Whether it may be told otherwise: not while it takes off, lands or returns by itself."""
-
-
-@dataclass(frozen=True, slots=True)
-class Advice:
-    """What a UAV is to do until the next decision."""
-
-    maneuver: Maneuver
-    path_enu_m: tuple[Place, ...] = ()
-    """Of OVER and ASIDE: where to fly instead."""
-    speed_m_s: float | None = None
-    """Of SLOW."""
-    because_of: str | None = None
-    """To whom it gives way, or before whom it brakes."""
-    braked: bool = False
-    """It would go on, and stands until another one has moved."""
-
-    @property
-    def stands(self) -> bool:
-        """Whether the vehicle is to stop, or stay stopped."""
-        return self.braked or self.maneuver is Maneuver.HOLD
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,8 +51,6 @@ class _Option:
 Clear = Callable[[Sequence[Place]], bool]
 
 _SLOW = 0.5
-_GRID_M = 0.3
-"""What samples of two motions may miss of their least distance."""
 _CLEAR_S = 1.0
 """Who has given way or braked goes on once there has been room for so long."""
 _HELD_S = 5.0
@@ -176,6 +127,8 @@ class TacticalResolver:
         if not own.gives_way:
             self._end()
             return self._advice
+        if self._keeps_on(own, picture, now_s):
+            return self._advice
         others = [
             self._look(own, uav, track, now_s)
             for uav, track in picture.near(own.position_enu_m, now_s)
@@ -193,6 +146,25 @@ class TacticalResolver:
             barred_by = self._advice.because_of
         self._adopt(own, option, because_of, barred_by, others, now_s)
         return self._advice
+
+    def _keeps_on(self, own: OwnFlight, picture: TrafficPicture, now_s: float) -> bool:
+        """Whether it flies on as it did, as nobody is in its way: mostly that is soon seen."""
+        option = self._option
+        if self._advice.stands or (option is not None and option.maneuver is not Maneuver.KEEP):
+            return False
+        if now_s < self._brakes_until_s or any(until > now_s for until in self._obstinate.values()):
+            return False
+        anybody = picture.glance(
+            *(own.position_enu_m, own.velocity_enu_m_s, own.path_enu_m, own.speed_m_s),
+            self._borrowed or own.precedence,
+            now_s,
+        )
+        if anybody:
+            keep = _Option(Maneuver.KEEP, own.path_enu_m, own.speed_m_s, "keep")
+            self._adopt(own, keep, None, None, (), now_s)
+        elif anybody is False:
+            self._end()
+        return anybody is not None
 
     def pace_s(self, own: OwnFlight, picture: TrafficPicture, now_s: float) -> float:
         """How long the next decision and the next word can wait after the last one [s].
@@ -388,11 +360,11 @@ class TacticalResolver:
         way_m = motion_m(*flown, rules.agility, math.inf, rules.horizon_s)
         for other in near:
             # Who is nearer already comes no nearer.
-            here_m = math.dist(way_m[0], other.expected_m[0]) - _GRID_M
+            here_m = math.dist(way_m[0], other.expected_m[0]) - GRID_M
             if least_meeting_m(way_m, other.expected_m) < min(asked_m, here_m):
                 return other.uav
             if other.column_m is not None:
-                here_m = least_distance_m(way_m[:1], other.column_m) - _GRID_M
+                here_m = least_distance_m(way_m[:1], other.column_m) - GRID_M
                 if least_distance_m(way_m, other.column_m) < min(asked_m, here_m):
                     return other.uav
         return None
@@ -408,7 +380,7 @@ class TacticalResolver:
             return None
         drive_s = rules.tick_s + rules.reaction_s
         flown = own.position_enu_m, own.velocity_enu_m_s, option.path_enu_m, option.speed_m_s
-        asked_m = rules.separation_m + _GRID_M + (WIDE_M if wide else 0.0)
+        asked_m = rules.separation_m + GRID_M + (WIDE_M if wide else 0.0)
         mine = reach(*flown, rules.agility, drive_s, brakes=True)
         near = [other for other in others if mine.distance_m(other.halts) < asked_m]
         if not near:
@@ -422,7 +394,7 @@ class TacticalResolver:
                 continue
             # Who is nearer already comes no nearer.
             inside = least_distance_m(way_m[:1], stops_m, stray) < asked_m
-            here_m = least_distance_m(way_m[:1], stops_m) - _GRID_M
+            here_m = least_distance_m(way_m[:1], stops_m) - GRID_M
             if not inside or least_distance_m(way_m, stops_m) < here_m:
                 return other.uav
         return None

@@ -9,15 +9,13 @@ from swarm.kernels.motions import FloatArray
 from swarm.separation.tactical_motion import stray_m
 from swarm.separation.tactical_reach import Cylinder, reach
 from swarm.separation.tactical_traffic import (
+    WIDE_M,
     Grade,
     NearbyTrack,
     TrafficPicture,
     TrafficRules,
     TrafficWord,
 )
-
-WIDE_M = 0.7
-"""Who has given way goes on only where there is so much more room."""
 
 
 class Other:
@@ -75,6 +73,9 @@ def pace_s(
         now_s: now, on the own clock.
         gives_way: whether it may be told otherwise than to fly on.
     """
+    is_close = picture.is_close(word, now_s, gives_way=gives_way)
+    if is_close is not None:
+        return rules.tick_s if is_close else rules.beacon_s
     age_s = rules.beacon_s + rules.tick_s
     mine = reach(
         *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s),

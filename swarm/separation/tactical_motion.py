@@ -21,7 +21,10 @@ STEP_S = 0.25
 """Between two samples of a motion [s]."""
 _LONGEST_S = 25_000.0
 """As long as the motion of a UAV is looked at that hardly brakes at all [s]."""
-_COLUMN_STEP_M = 1.0
+COLUMN_STEP_M = 1.0
+"""Between two places of a column."""
+GRID_M = 0.3
+"""What samples of two motions may miss of their least distance."""
 _BESIDE_M = 1.0
 """Whoever is that near in the view from above is not flown round: it is above or below."""
 
@@ -111,7 +114,7 @@ def round_m(from_m: Place, past_m: FloatArray, aside_m: float) -> list[tuple[Pla
 
 def column_m(place_m: Place, end_up_m: float) -> FloatArray:
     """Places straight above or below one, as far as that height; shape (samples, 3)."""
-    samples = 2 + math.ceil(abs(end_up_m - place_m[2]) / _COLUMN_STEP_M)
+    samples = 2 + math.ceil(abs(end_up_m - place_m[2]) / COLUMN_STEP_M)
     return np.linspace(place_m, (place_m[0], place_m[1], end_up_m), samples)
 
 

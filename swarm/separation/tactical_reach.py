@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 from swarm.separation.tactical_motion import STEP_S, Agility, Place
 
-_SLACK_M = 0.3
+SLACK_M = 0.3
 """What samples of a motion may be higher or lower than by this reckoning."""
 
 
@@ -76,5 +76,5 @@ def reach(
             rise_m_s = max(rise_m_s, min(pace_m_s, agility.climb_m_s))
         here_m = corner_m
     # Until it has turned into the next piece it may still rise or sink as on the one before.
-    over_m = rise_m_s * 2.0 * fast_m_s / agility.acceleration_m_s2 + _SLACK_M
-    return Cylinder(position_m, far_m + _SLACK_M, low_m - over_m, high_m + over_m)
+    over_m = rise_m_s * 2.0 * fast_m_s / agility.acceleration_m_s2 + SLACK_M
+    return Cylinder(position_m, far_m + SLACK_M, low_m - over_m, high_m + over_m)

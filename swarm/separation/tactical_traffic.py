@@ -9,12 +9,15 @@ for a while. Leaves out: what follows (swarm.separation.tactical) and the bus.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 from swarm.kernels.motions import FloatArray
+from swarm.kernels.traffic import PrecedenceNumbers, TrafficNumbers, TrafficTable
 from swarm.separation.tactical_motion import (
+    COLUMN_STEP_M,
+    GRID_M,
     STEP_S,
     Agility,
     Place,
@@ -22,7 +25,7 @@ from swarm.separation.tactical_motion import (
     motion_m,
     stray_m,
 )
-from swarm.separation.tactical_reach import Cylinder, reach
+from swarm.separation.tactical_reach import SLACK_M, Cylinder, reach
 
 
 class Grade(IntEnum):
@@ -45,6 +48,11 @@ class Precedence:
     depth: int = 0
     """0: its own; else it makes room for one of depth - 1, and goes before all others as that one
     does."""
+
+    @property
+    def numbers(self) -> PrecedenceNumbers:
+        """As kernels compare it."""
+        return int(self.grade), self.rank, self.depth
 
     @property
     def of_who_makes_room(self) -> Precedence:
@@ -141,6 +149,8 @@ _ROOM_M = 1.0
 _LEAST_ASIDE_M = 2.0
 _AHEAD_S = 4.0
 
+WIDE_M = 0.7
+"""Who has given way goes on only where there is so much more room."""
 SILENT_S = 3.0
 """Who has said nothing for so long is not expected to give way, nor to have turned meanwhile: the
 next words of a turn get lost together less than once in 10^8 turns at 20 % loss."""
@@ -189,6 +199,8 @@ class NearbyTrack:
         """When it was last seen to have moved."""
         self._implausible_until_s = -math.inf
         self._disbelieved_until_s = -math.inf
+        self.when_disbelieved: Callable[[float], None] = lambda _: None
+        """Is told until when it is not believed any more."""
 
     def hear(self, word: TrafficWord, now_s: float, age_s: float, rules: TrafficRules) -> None:
         """It says so now."""
@@ -210,6 +222,7 @@ class NearbyTrack:
         if self.cost_s >= PATIENCE_S:
             self.cost_s = 0.0
             self._disbelieved_until_s = now_s + DISBELIEF_S
+            self.when_disbelieved(self._disbelieved_until_s)
 
     def forgive(self, now_s: float) -> None:
         """Time passes."""
@@ -328,6 +341,11 @@ class TrafficPicture:
         self._tracks: dict[str, NearbyTrack] = {}
         self._gone: dict[str, NearbyTrack] = {}
         """Who has landed or left: what it has cost still counts when it is back."""
+        self._table = TrafficTable(_numbers_of(rules))
+        self._numbers: dict[str, int] = {}
+        """Under which each is in the table."""
+        self._doubts_until_s = -math.inf
+        """Until when somebody may not be believed."""
 
     def hear(self, uav: str, word: TrafficWord, now_s: float, age_s: float) -> bool:
         """Another UAV says so of itself; whether it was not known to be near, or silent.
@@ -343,12 +361,67 @@ class TrafficPicture:
         is_new = known is None or known.is_silent(now_s)
         track = known or self._gone.get(uav)
         if track is None:
-            self._tracks[uav] = NearbyTrack(word, now_s, age_s)
+            track = NearbyTrack(word, now_s, age_s)
+            track.when_disbelieved = self._doubt
         elif now_s - age_s >= track.said_s:
-            self._tracks[uav] = track
             self._gone.pop(uav, None)
             track.hear(word, now_s, age_s, self._rules)
+        else:
+            return is_new
+        self._tracks[uav] = track
+        self._table.hear(
+            self._numbers.setdefault(uav, len(self._numbers)),
+            *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s),
+            track.said_s,
+            word.precedence.numbers,
+        )
         return is_new
+
+    def _doubt(self, until_s: float) -> None:
+        self._doubts_until_s = max(self._doubts_until_s, until_s)
+
+    def glance(
+        self,
+        position_enu_m: Place,
+        velocity_enu_m_s: Place,
+        path_enu_m: Sequence[Place],
+        speed_m_s: float,
+        precedence: Precedence,
+        now_s: float,
+    ) -> bool | None:
+        """Whether anybody matters to a UAV that flies so, of whom none is in its way or bars it.
+
+        None: somebody is, or may be, and has to be looked at.
+
+        Args:
+            position_enu_m: where it is [m].
+            velocity_enu_m_s: how it moves.
+            path_enu_m: corners ahead; empty: it hovers, or is about to stop.
+            speed_m_s: at which it flies that.
+            precedence: its own.
+            now_s: now, on the own clock.
+        """
+        if now_s < self._doubts_until_s:
+            return None
+        flown = position_enu_m, velocity_enu_m_s, path_enu_m, speed_m_s
+        anybody, odd, in_way = self._table.look(*flown, now_s, precedence.numbers)
+        return None if odd or in_way else anybody
+
+    def is_close(self, word: TrafficWord, now_s: float, *, gives_way: bool) -> bool | None:
+        """Whether anybody is close, see `swarm.separation.tactical_look.pace_s`.
+
+        None: somebody has to be looked at for that.
+
+        Args:
+            word: of the own flight.
+            now_s: now, on the own clock.
+            gives_way: whether it may be told otherwise than to fly on.
+        """
+        if now_s < self._doubts_until_s:
+            return None
+        flown = word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s
+        is_close, odd = self._table.is_close(*flown, now_s, gives_way=gives_way)
+        return None if odd else is_close
 
     def place_of(self, uav: str) -> Place | None:
         """Where a UAV said last that it is; None: it is not heard."""
@@ -364,6 +437,7 @@ class TrafficPicture:
         """It has landed, or left."""
         if (track := self._tracks.pop(uav, None)) is not None:
             self._gone[uav] = track
+            self._table.forget(self._numbers[uav])
 
     def near(self, place_m: Place, now_s: float) -> Iterator[tuple[str, NearbyTrack]]:
         """Those who matter to a UAV at that place, in the order of their ids."""
@@ -394,3 +468,27 @@ class TrafficPicture:
             return False  # nowhere that it could be by now is so far away
         expected_m = track.expected_m(now_s, self._rules)[0]
         return math.dist(place_m, expected_m.tolist()) > self._heard_m
+
+
+def _numbers_of(rules: TrafficRules) -> TrafficNumbers:
+    return TrafficNumbers(
+        separation_m=rules.separation_m,
+        apart_m=rules.apart_m,
+        reach_m=rules.reach_m,
+        fastest_m_s=rules.fastest_m_s,
+        acceleration_m_s2=rules.agility.acceleration_m_s2,
+        climb_m_s=rules.agility.climb_m_s,
+        reaction_s=rules.reaction_s,
+        tick_s=rules.tick_s,
+        beacon_s=rules.beacon_s,
+        horizon_s=rules.horizon_s,
+        step_s=STEP_S,
+        silent_s=SILENT_S,
+        forget_s=FORGET_S,
+        grid_m=GRID_M,
+        wide_m=WIDE_M,
+        slack_m=SLACK_M,
+        stands_m=_STANDS_M,
+        most_column_m=_MOST_COLUMN_M,
+        column_step_m=COLUMN_STEP_M,
+    )

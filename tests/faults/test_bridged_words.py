@@ -14,7 +14,8 @@ from sim.world.engine import Process
 from swarm.protocol.events import LogLine
 from swarm.protocol.messages import Message
 from swarm.protocol.uav_messages import Nearby
-from swarm.separation.tactical import Advice, OwnFlight, TacticalResolver
+from swarm.separation.tactical import TacticalResolver
+from swarm.separation.tactical_advice import Advice, OwnFlight
 from swarm.separation.tactical_traffic import SILENT_S, TrafficPicture
 from tests.support.bridged_crossings import CrossingFleet, mission_of
 

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from swarm.separation.tactical import Advice, Clear, Maneuver, OwnFlight, TacticalResolver
+from swarm.separation.tactical import Clear, TacticalResolver
+from swarm.separation.tactical_advice import Advice, Maneuver, OwnFlight
 from swarm.separation.tactical_motion import Place
 from swarm.separation.tactical_traffic import (
     Grade,

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import shapely
 
-from swarm.separation.tactical import OwnFlight, TacticalResolver
+from swarm.separation.tactical import TacticalResolver
+from swarm.separation.tactical_advice import OwnFlight
 from swarm.separation.tactical_motion import Place
 from swarm.separation.tactical_traffic import (
     DISBELIEF_S,

@@ -11,7 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm.kernels.motions import FloatArray, least_distance_m
-from swarm.separation.tactical import OwnFlight, TacticalResolver
+from swarm.separation.tactical import TacticalResolver
+from swarm.separation.tactical_advice import OwnFlight
 from swarm.separation.tactical_motion import (
     STEP_S,
     Agility,

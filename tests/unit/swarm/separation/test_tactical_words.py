@@ -6,7 +6,8 @@ import math
 
 import pytest
 
-from swarm.separation.tactical import Maneuver, OwnFlight, TacticalResolver
+from swarm.separation.tactical import TacticalResolver
+from swarm.separation.tactical_advice import Maneuver, OwnFlight
 from swarm.separation.tactical_motion import Agility, Place
 from swarm.separation.tactical_traffic import (
     FORGET_S,

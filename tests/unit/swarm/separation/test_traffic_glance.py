@@ -1,0 +1,164 @@
+"""What one glance tells of those near a UAV is what looking at each of them would."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm.separation.tactical import TacticalResolver
+from swarm.separation.tactical_advice import Maneuver, OwnFlight
+from swarm.separation.tactical_motion import Place
+from swarm.separation.tactical_traffic import (
+    Grade,
+    Precedence,
+    TrafficPicture,
+    TrafficRules,
+    TrafficWord,
+)
+
+RULES = TrafficRules(6.0, 10.0, low_m=0.0, high_m=120.0)
+
+flat = st.floats(-150.0, 150.0)
+heights = st.one_of(st.sampled_from([30.0, 38.0, 46.0]), st.floats(0.0, 120.0))
+places = st.tuples(flat, flat, heights)
+paces = st.floats(-8.0, 8.0)
+velocities = st.tuples(paces, paces, st.one_of(st.just(0.0), st.floats(-2.0, 2.0)))
+paths = st.lists(places, max_size=4).map(tuple)
+precedences = st.builds(Precedence, st.sampled_from(Grade), st.integers(0, 3), st.integers(0, 1))
+words = st.builds(TrafficWord, places, velocities, paths, st.floats(0.5, 14.0), precedences)
+flights = st.builds(OwnFlight, places, velocities, paths, st.floats(0.5, 10.0), precedences)
+ages = st.floats(0.0, 8.0)
+
+
+def looked_closely(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From now on nothing is told by a glance."""
+    monkeypatch.setattr(TrafficPicture, "glance", lambda *_, **__: None)
+    monkeypatch.setattr(TrafficPicture, "is_close", lambda *_, **__: None)
+
+
+def decided(
+    own: OwnFlight, heard: list[tuple[TrafficWord, float]], times_s: list[float]
+) -> list[object]:
+    """Advice, word and pace at these times, with these words of others heard at 0, so old."""
+    picture, resolver = TrafficPicture(RULES, 225.0), TacticalResolver("u5", RULES)
+    for number, (word, age_s) in enumerate(heard):
+        picture.hear(f"u{number}", word, 0.0, age_s)
+    found: list[object] = []
+    for now_s in times_s:
+        found += [resolver.decide(own, picture, now_s), resolver.word(own)]
+        found.append(resolver.pace_s(own, picture, now_s))
+    return found
+
+
+@given(flights, st.lists(st.tuples(words, ages), max_size=8), st.floats(0.0, 4.0))
+def test_whatever_is_heard_it_decides_as_if_it_had_looked_at_each(
+    own: OwnFlight, heard: list[tuple[TrafficWord, float]], later_s: float
+) -> None:
+    times_s = [0.0, later_s, later_s + 3.5]
+    quick = decided(own, heard, times_s)
+    with pytest.MonkeyPatch.context() as patches:
+        looked_closely(patches)
+        assert quick == decided(own, heard, times_s)
+
+
+def on_way(place: Place, velocity: Place, after_s: float) -> Place:
+    (east, north, up), (east_m_s, north_m_s, up_m_s) = place, velocity
+    return east + after_s * east_m_s, north + after_s * north_m_s, up + after_s * up_m_s
+
+
+def crossing(seed: int) -> list[tuple[Place, Place, float]]:
+    """Where each of a crowd in three layers begins, how it moves, and its rank's number."""
+    rng = np.random.default_rng(seed)
+    flown = []
+    for _ in range(14):
+        place = (*rng.uniform(-150.0, 150.0, 2).tolist(), float(rng.choice([30.0, 38.0, 46.0])))
+        turn = rng.uniform(0.0, 2.0 * math.pi)
+        flown.append((place, (8.0 * math.cos(turn), 8.0 * math.sin(turn), 0.0), rng.random()))
+    return flown
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_over_many_ticks_of_a_crowd_nothing_is_otherwise_and_mostly_a_glance_is_enough(
+    seed: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    glances: list[bool | None] = []
+    told = TrafficPicture.glance
+
+    def counted(self: TrafficPicture, *args: object) -> bool | None:
+        glances.append(told(self, *args))  # type: ignore[arg-type]
+        return glances[-1]
+
+    def flown() -> list[object]:
+        picture, resolver = TrafficPicture(RULES, 225.0), TacticalResolver("u00", RULES)
+        found: list[object] = []
+        for tick in range(40):
+            now_s = 0.25 * tick
+            for number, (place, velocity, rank) in enumerate(crossing(seed)):
+                at, ahead = on_way(place, velocity, now_s), on_way(place, velocity, 60.0)
+                if number == 0:
+                    own = OwnFlight(at, velocity, (ahead,), 8.0, Precedence(Grade.FLYING, 5))
+                elif (tick + number) % 4 == 0:
+                    precedence = Precedence(Grade.FLYING, int(9 * rank))
+                    word = TrafficWord(at, velocity, (ahead,), 8.0, precedence)
+                    picture.hear(f"u{number:02}", word, now_s, 0.1)
+                if number == 3 and tick == 20:
+                    picture.forget("u03")
+            found += [resolver.decide(own, picture, now_s), resolver.pace_s(own, picture, now_s)]
+        return found
+
+    monkeypatch.setattr(TrafficPicture, "glance", counted)
+    quick = flown()
+    assert glances.count(None) < 0.6 * len(quick) / 2
+    looked_closely(monkeypatch)
+    assert quick == flown()
+
+
+def test_who_is_not_believed_has_to_be_looked_at() -> None:
+    picture = TrafficPicture(RULES, 225.0)
+    far = TrafficWord((100.0, 0.0, 100.0), (1.0, 0.0, 0.0), (), 8.0, Precedence(Grade.FLYING, 1))
+    flown = (0.0, 0.0, 30.0), (8.0, 0.0, 0.0), ((50.0, 0.0, 30.0),), 8.0
+    mine = Precedence(Grade.FLYING, 2)
+    picture.hear("u1", far, 0.0, 0.0)
+    assert picture.glance(*flown, mine, 0.0) is True
+    assert picture.glance((5e3, 0.0, 30.0), *flown[1:], mine, 0.0) is False
+
+    picture.hear("u1", replace(far, position_enu_m=(106.0, 0.0, 100.0)), 1.0, 0.0)
+    picture.blame("u1", 1.0, 60.0)
+
+    assert picture.glance(*flown, mine, 1.0) is None
+    assert list(picture.near((0.0, 0.0, 30.0), 1.0)) == []
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf])
+def test_a_place_that_is_none_is_refused(bad: float) -> None:
+    picture = TrafficPicture(RULES, 225.0)
+    mine = Precedence(Grade.FLYING, 2)
+    with pytest.raises(ValueError, match="place_m must be finite"):
+        picture.glance((bad, 0.0, 0.0), (0.0, 0.0, 0.0), (), 8.0, mine, 0.0)
+
+
+def test_the_greatest_numbers_that_a_word_may_hold_are_taken() -> None:
+    picture = TrafficPicture(RULES, 225.0)
+    corner = (1e8, -1e8, 1e8)
+    greatest = Precedence(Grade.FREE, 2**63 - 1, 255)
+    word = TrafficWord((-1e8, 1e8, -1e8), corner, (corner,) * 8, 1e6, greatest)
+
+    assert picture.hear("u1", word, 0.0, 10.0)
+    assert picture.glance((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (), 8.0, greatest, 0.0) is False
+
+
+def test_its_advice_is_still_to_keep_on_where_nobody_is_in_the_way() -> None:
+    picture, resolver = TrafficPicture(RULES, 225.0), TacticalResolver("u5", RULES)
+    own = OwnFlight(
+        *((0.0, 0.0, 30.0), (8.0, 0.0, 0.0), ((99.0, 0.0, 30.0),), 8.0),
+        Precedence(Grade.FLYING, 1),
+    )
+    above = TrafficWord((9.0, 0.0, 46.0), (0.0, 0.0, 0.0), (), 8.0, Precedence(Grade.FLYING, 0))
+    picture.hear("u1", above, 0.0, 0.0)
+
+    assert resolver.decide(own, picture, 0.0).maneuver is Maneuver.KEEP
