@@ -1072,3 +1072,17 @@ def least_distance_m(
     flat_m: float,
     upright_m: float,
 ) -> float: ...
+def paths_apart(
+    cuts_m: Annotated[
+        NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)
+    ],
+    near_m: float,
+    asked_m: float,
+    one_m: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    other_m: Annotated[
+        NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
+    ],
+    within: Sequence[int] | None,
+) -> bool: ...

@@ -16,6 +16,7 @@ void bind_ground(nanobind::module_& module);
 void bind_long_tours(nanobind::module_& module);
 void bind_lower_level(nanobind::module_& module);
 void bind_motions(nanobind::module_& module);
+void bind_paths(nanobind::module_& module);
 void bind_problem(nanobind::module_& module);
 void bind_rollout(nanobind::module_& module);
 void bind_routes(nanobind::module_& module);

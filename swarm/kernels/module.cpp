@@ -20,4 +20,5 @@ NB_MODULE(_kernels, module) {
     peckorder::bind_field_insertion(module);
     peckorder::bind_ground(module);
     peckorder::bind_motions(module);
+    peckorder::bind_paths(module);
 }

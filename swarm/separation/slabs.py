@@ -14,11 +14,13 @@ import itertools
 import math
 from bisect import bisect_left, bisect_right
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
+
+from swarm.kernels.paths import paths_apart
 
 FloatArray = npt.NDArray[np.float64]
 Path = npt.NDArray[np.float64]
@@ -33,8 +35,6 @@ _ROUNDED_M = 1e-6
 """What is forgiven of a distance that was planned to be just as large as asked."""
 _MOST_SLABS = 256
 """Over ground whose heights differ more, slabs are thicker."""
-_MANY = 2
-"""Slabs that two paths have in common, beyond which they are first seen as a whole."""
 
 
 def planned_apart_m(separation_m: float) -> float:
@@ -84,8 +84,11 @@ class Slabs:
     """Where one slab ends and the next begins, lowest first [m above the mission origin]."""
     level: bool = True
     """Whether layers are level, so that each has a slab of its own."""
+    cut_array_m: FloatArray = field(init=False, repr=False, compare=False)
+    """The cuts as kernels take them."""
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "cut_array_m", np.array(self.cuts_m, dtype=np.float64))
         gaps_m = np.diff(self.layers_m)
         least_m = planned_apart_m(self.separation_m) - _ROUNDED_M
         if not self.layers_m or (gaps_m < least_m).any():
@@ -126,7 +129,7 @@ class Slabs:
         return tuple(frozenset(range(low, high)) for low, high in itertools.pairwise(ends))
 
     @property
-    def _near_m(self) -> float:
+    def near_m(self) -> float:
         """Who is no farther than that from a slab may meet somebody in it [m].
 
         Half of the separation, and as much more for errors of places as lets level flight, half
@@ -136,7 +139,7 @@ class Slabs:
 
     def reach_m(self, slab: int) -> tuple[float, float]:
         """Heights from which one may come too near to somebody in ``slab`` [m]."""
-        near_m = self._near_m
+        near_m = self.near_m
         low_m = self.cuts_m[slab - 1] - near_m if slab > 0 else -math.inf
         high_m = self.cuts_m[slab] + near_m if slab < len(self.cuts_m) else math.inf
         return low_m, high_m
@@ -146,7 +149,7 @@ class Slabs:
         if not len(path_enu_m):
             return frozenset()
         lowest_m, highest_m = float(path_enu_m[:, 2].min()), float(path_enu_m[:, 2].max())
-        near_m = self._near_m
+        near_m = self.near_m
         first = bisect_right(self.cuts_m, lowest_m, key=lambda cut_m: cut_m + near_m)
         last = bisect_left(self.cuts_m, highest_m, key=lambda cut_m: cut_m - near_m)
         return frozenset(range(first, last + 1))
@@ -191,98 +194,8 @@ def apart(
         other_enu_m: (l, 3) corners [m].
         within: slabs that matter; None: all.
     """
-    return _apart(slabs, one_enu_m.tobytes(), other_enu_m.tobytes(), within)
-
-
-@lru_cache(maxsize=4096)
-def _apart(slabs: Slabs, one: bytes, other: bytes, within: frozenset[int] | None) -> bool:
-    """`apart`, of paths as bytes: the same ones are looked at again with every word."""
-    one_enu_m, other_enu_m = (np.frombuffer(path).reshape(-1, 3) for path in (one, other))
-    common = slabs.touched(one_enu_m) & slabs.touched(other_enu_m)
     asked_m = planned_apart_m(slabs.separation_m) - _ROUNDED_M
-    if len(common) > _MANY:
-        ones, others = (
-            _flat_pieces(path, -math.inf, math.inf) for path in (one_enu_m, other_enu_m)
-        )
-        if least_flat_m(ones, others) >= asked_m:
-            return True
-    for slab in common if within is None else common & within:
-        low_m, high_m = slabs.reach_m(slab)
-        mine, its = _flat_pieces(one_enu_m, low_m, high_m), _flat_pieces(other_enu_m, low_m, high_m)
-        if len(mine) and len(its) and least_flat_m(mine, its) < asked_m:
-            return False
-    return True
-
-
-def least_flat_m(ones_m: FloatArray, others_m: FloatArray) -> float:
-    """Least distance of any of some straight pieces from any of others, seen from above [m].
-
-    Two pieces that do not cross are nearest at one of their four ends.
-
-    Args:
-        ones_m: (n, 2, 2) their beginnings and ends [m; east, north]; n > 0.
-        others_m: (m, 2, 2) alike; m > 0.
-    """
-    if _cross(ones_m, others_m):
-        return 0.0
-    near_m = [
-        _ends_from(ones_m, others_m),
-        _ends_from(others_m, ones_m),
-    ]
-    return float(min(near_m))
-
-
-def _flat_pieces(path_enu_m: Path, low_m: float, high_m: float) -> FloatArray:
-    """(n, 2, 2) what of a path is between two heights, seen from above [m]."""
-    begin, end = (
-        (path_enu_m, path_enu_m) if len(path_enu_m) == 1 else (path_enu_m[:-1], path_enu_m[1:])
-    )
-    rise_m = end[:, 2] - begin[:, 2]
-    level = np.abs(rise_m) < 1e-9
-    per_m = np.where(level, 0.0, 1.0 / np.where(level, 1.0, rise_m))
-    with np.errstate(invalid="ignore"):
-        at_low, at_high = (low_m - begin[:, 2]) * per_m, (high_m - begin[:, 2]) * per_m
-    at_low, at_high = np.where(level, -math.inf, at_low), np.where(level, math.inf, at_high)
-    first = np.clip(np.minimum(at_low, at_high), 0.0, 1.0)
-    last = np.clip(np.maximum(at_low, at_high), 0.0, 1.0)
-    inside = np.where(
-        level,
-        (begin[:, 2] > low_m) & (begin[:, 2] < high_m),
-        (np.minimum(begin[:, 2], end[:, 2]) < high_m)
-        & (np.maximum(begin[:, 2], end[:, 2]) > low_m),
-    )
-    way = end[:, :2] - begin[:, :2]
-    pieces = np.stack(
-        [begin[:, :2] + first[:, None] * way, begin[:, :2] + last[:, None] * way], axis=1
-    )
-    return pieces[inside]
-
-
-def _ends_from(ones_m: FloatArray, others_m: FloatArray) -> float:
-    """Least distance of any end of some pieces from others [m]."""
-    ends_m = ones_m.reshape(-1, 1, 2)
-    begin, way = others_m[:, 0], others_m[:, 1] - others_m[:, 0]
-    length2 = (way * way).sum(axis=1)
-    along = ((ends_m - begin) * way).sum(axis=2) / np.where(length2 > 0.0, length2, 1.0)
-    nearest = begin + np.clip(along, 0.0, 1.0)[:, :, None] * way
-    return float(np.sqrt(((ends_m - nearest) ** 2).sum(axis=2).min()))
-
-
-def _cross(ones_m: FloatArray, others_m: FloatArray) -> bool:
-    """Whether any of some pieces crosses any of others, both truly."""
-    a, b = ones_m[:, None, 0], ones_m[:, None, 1]
-    c, d = others_m[None, :, 0], others_m[None, :, 1]
-    over = _side(a, b, c) * _side(a, b, d) < 0.0
-    under = _side(c, d, a) * _side(c, d, b) < 0.0
-    return bool((over & under).any())
-
-
-def _side(a: FloatArray, b: FloatArray, c: FloatArray) -> FloatArray:
-    """On which side of the lines from ``a`` to ``b`` points are."""
-    turned: FloatArray = (b[..., 0] - a[..., 0]) * (c[..., 1] - a[..., 1]) - (
-        b[..., 1] - a[..., 1]
-    ) * (c[..., 0] - a[..., 0])
-    return turned
+    return paths_apart(slabs.cut_array_m, slabs.near_m, asked_m, one_enu_m, other_enu_m, within)
 
 
 def start_layers(

@@ -15,10 +15,10 @@ from swarm.separation.slabs import (
     apart,
     keeper_rows,
     keeper_seats,
-    least_flat_m,
     shared_layers_m,
     start_layers,
 )
+from tests.support.paths_reference import least_flat_m
 
 SLABS = Slabs.between(10.0, (30.0, 42.0, 54.0))
 
