@@ -286,6 +286,7 @@ class _Flight:
             together=lambda heard: heard,
             settled=lambda: not core.is_contested,
             pressing_s=core.next_own_deadline_s,
+            runs_since=core.run_since,
             crowd=lambda there: some_of(core.uav, there),
             shared=shared,
         )

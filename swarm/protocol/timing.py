@@ -195,6 +195,9 @@ class StallDetector:
     def __init__(self, limit_s: float) -> None:
         self._limit_s = limit_s
         self._deadline_s: float | None = None
+        self.runs_since_s = math.inf
+        """Since when this process is known to have run without a stop; infinite: it is not known.
+        What has been missed since then has only waited for others in it."""
 
     def expect_by(self, deadline_s: float | None) -> None:
         """After a step: the next one comes by then; None if there is no need for one."""
@@ -202,4 +205,5 @@ class StallDetector:
 
     def late(self, now_s: float) -> bool:
         """At the start of a step: whether the promised deadline is long past."""
-        return self._deadline_s is not None and now_s - self._deadline_s > self._limit_s
+        stood_until_s = min(now_s, self.runs_since_s)
+        return self._deadline_s is not None and stood_until_s - self._deadline_s > self._limit_s

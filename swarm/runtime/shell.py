@@ -10,13 +10,13 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections import Counter, deque
+from collections import deque
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import partial
 from typing import Generic, Protocol, TypeVar
 
 from swarm import __version__
-from swarm.bus.admission import TOO_MANY, AdmissionControl
+from swarm.bus.admission import AdmissionControl
 from swarm.bus.port import Bus, BusEvent, LinkDown, LinkUp, Query, Sample, TokenGone, TokenSeen
 from swarm.protocol.codec import Codec
 from swarm.protocol.events import (
@@ -48,10 +48,10 @@ from swarm.protocol.messages import (
     Stamp,
     roster_message,
 )
-from swarm.protocol.registers import NO_ROOM
 from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind
 from swarm.protocol.uav_messages import News
 from swarm.runtime.clock import Clock
+from swarm.runtime.drop_count import DropCount
 from swarm.runtime.joining import gathered_keys
 from swarm.runtime.log import get_logger
 from swarm.runtime.state_exchange import StateExchange, draw_nonce
@@ -111,6 +111,8 @@ class Shell(Generic[E, A]):
             by itself. None for a core that wants to hear each when it comes.
         settled: whether nothing would follow at once from what others claim.
         pressing_s: see `Alarm`; by default nothing can wait.
+        runs_since: in a large fleet of which it shares a process, is told before each step since
+            when that has run without a stop; what came on the bus meanwhile has been heard.
         crowd: see `StateExchange`.
         shared: what it has in common with others in this process; None for one that is alone there.
     """
@@ -137,6 +139,7 @@ class Shell(Generic[E, A]):
         together: Callable[[MessagesReceived], E] | None = None,
         settled: Callable[[], bool] = lambda: True,
         pressing_s: Callable[[], float | None] = lambda: -math.inf,
+        runs_since: Callable[[float], None] = lambda _: None,
         crowd: Callable[[Collection[str]], Sequence[str]] | None = None,
         shared: SharedProcess | None = None,
     ) -> None:
@@ -166,7 +169,9 @@ class Shell(Generic[E, A]):
         self._from_bus = from_bus
         self._execute = execute
         self._register = register
-        self._left_out = left_out
+        self._drop_count = DropCount(
+            bus.inbox, self._admission, left_out, self._codec.dropped, self._log
+        )
         self._save = save
         self._context = context
         self._loop = asyncio.get_running_loop()
@@ -175,6 +180,7 @@ class Shell(Generic[E, A]):
         self._together = together
         self._settled = settled
         self._turns = None if shared is None else shared.turns
+        self._runs_since = runs_since
         self._alarm = Alarm(clock, self._turns, pressing_s, self._look)
         self._put_off: E | None = None
         """What the core is to hear when it has its turn."""
@@ -192,13 +198,11 @@ class Shell(Generic[E, A]):
         """Of the sky, whose traffic is heard."""
         self._briefed: Stamp | None = None
         """Of the newest brief that was heard."""
-        self._counted: Counter[str] = Counter()
-        """Of what others than the codec have dropped, what is counted there."""
 
     @property
     def dropped(self) -> Mapping[str, int]:
         """Messages dropped so far, by reason."""
-        self._count()
+        self._drop_count.take()
         return self._codec.dropped
 
     async def run(self) -> int:
@@ -233,6 +237,8 @@ class Shell(Generic[E, A]):
             self._guard(self._step_all)
 
     def _step_all(self) -> None:
+        if self._turns is not None and self._gathering is not None:
+            self._runs_since(self._turns.runs_since_s(self._clock))
         while self._events and not self._done.done():
             for action in self._core.step(self._events.popleft(), self._clock.now_s()):
                 self._carry_out(action)
@@ -408,7 +414,7 @@ class Shell(Generic[E, A]):
                 continue
             if self._turns is not None:
                 await self._turns.mine()
-            self._count()
+            self._drop_count.take()
             while self._unread:
                 self._read(TURN)
                 if self._unread:  # the vehicle must not wait for a flood of words
@@ -439,19 +445,6 @@ class Shell(Generic[E, A]):
         for kind in self._codec.newer - self._told_newer:
             self._told_newer.add(kind)
             self._log.info("a newer release says more than this one understands", kind=kind)
-
-    def _count(self) -> None:
-        """Count what was dropped before anything was read of it, or has no room in the core."""
-        gone, refused, left_out = self._bus.inbox.dropped, self._admission.refused, self._left_out()
-        if gone or refused or left_out:
-            counts = Counter(dict(refused))  # copied at once: others may count on meanwhile
-            counts[TOO_MANY] += gone
-            counts[NO_ROOM] = max(left_out, self._counted[NO_ROOM])
-            news = counts - self._counted
-            if news[NO_ROOM] and not self._counted[NO_ROOM]:
-                self._log.warning("others say more than there is room for", left_out=left_out)
-            self._codec.dropped.update(news)
-            self._counted = counts
 
     def _message(self, sample: Sample) -> Message | None:
         """What was said, if it is to be believed."""

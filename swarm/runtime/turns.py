@@ -7,6 +7,7 @@ follows from a word at once must not stand behind what dozens of others may do a
 from __future__ import annotations
 
 import asyncio
+import math
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -14,12 +15,27 @@ from dataclasses import dataclass, field
 from swarm.protocol.shared_messages import SharedMessages
 from swarm.runtime.clock import Clock
 
+_STOP_S = 0.5
+"""A process of dozens in which nobody does anything for so long has stood still [wall s]."""
+
 
 class Turns:
     """Of one loop; call from its thread."""
 
     def __init__(self) -> None:
         self._waiting: deque[Callable[[], None]] = deque()
+        self._ran_at_s = self._runs_since_s = -math.inf
+
+    def runs_since_s(self, clock: Clock) -> float:
+        """Since when this process has run without a stop [s of ``clock``, which all share].
+
+        To be asked by each of them at each step: that shows that it runs.
+        """
+        now_s = clock.now_s()
+        if clock.wall_delay_s(now_s - self._ran_at_s) > _STOP_S:
+            self._runs_since_s = now_s
+        self._ran_at_s = now_s
+        return self._runs_since_s
 
     def put_off(self, act: Callable[[], None]) -> None:
         """Do it after all that was put off before; it must not raise."""

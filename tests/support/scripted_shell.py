@@ -96,6 +96,7 @@ async def at_work(
     together: Callable[[MessagesReceived], CommonEvent] | None = None,
     crowd: Callable[[Collection[str]], Sequence[str]] | None = None,
     pressing_s: Callable[[], float | None] = lambda: None,
+    runs_since: Callable[[float], None] = lambda _: None,
     shared: SharedProcess | None = None,
     name: str = "u0",
 ) -> AsyncIterator[Played]:
@@ -127,6 +128,7 @@ async def at_work(
         together=together,
         crowd=crowd,
         pressing_s=pressing_s,
+        runs_since=runs_since,
         shared=shared,
     )
     running = asyncio.create_task(shell.run())

@@ -135,3 +135,44 @@ def test_words_of_the_bus_wait_for_their_turn_and_are_all_heard() -> None:
             await until(lambda: MessageReceived(EPOCH) in core.heard, "hearing it")
 
     play(scenario)
+
+
+def test_a_process_runs_since_it_stood_still_for_long() -> None:
+    turns, clock = Turns(), ScaledClockByHand(4.0)
+    assert turns.runs_since_s(clock) == 0.0
+    for _ in range(20):  # dozens of shells step all along
+        clock.wall_s += 0.25
+        assert turns.runs_since_s(clock) == 0.0
+
+    clock.wall_s += 3.0
+    assert turns.runs_since_s(clock) == clock.now_s() == 32.0
+    clock.wall_s += 0.25
+    assert turns.runs_since_s(clock) == 32.0
+
+
+class ScaledClockByHand:
+    """So many times as fast as wall time, which is set by hand."""
+
+    def __init__(self, speedup: float) -> None:
+        self.wall_s, self._speedup = 0.0, speedup
+
+    def now_s(self) -> float:
+        return self.wall_s * self._speedup
+
+    def wall_delay_s(self, delay_s: float) -> float:
+        return delay_s / self._speedup
+
+
+def test_a_core_of_a_large_fleet_is_told_before_each_step_since_when_its_process_runs() -> None:
+    async def scenario(n_uav: int) -> list[float]:
+        core, told = ScriptedCore(), list[float]()
+        shell = partial(at_work, core, shared=SharedProcess(), runs_since=told.append)
+        async with shell(together=lambda heard: MessageReceived(heard.messages[0])) as played:
+            await asyncio.sleep(0)
+            played.shell.suit_fleet(n_uav)
+            played.clock.time_s = 7.0
+            played.shell.step(PLACE)
+        return told
+
+    assert play(partial(scenario, 200)) == [7.0]
+    assert play(partial(scenario, 3)) == []  # there what has come may still be unread
