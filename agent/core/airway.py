@@ -14,6 +14,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from types import MappingProxyType
 
 from agent.core.base_stand import BaseStand
 from agent.core.fleet_air import ASIDE_PATIENCE, GIVES_UP_S, STOP_LEG, FleetAir
@@ -84,6 +85,9 @@ class Airway(WayFlown):
         self._kept = KeptAir(uav)
         self._stand = BaseStand()
         self._settled: tuple[object, ...] = ()  # what the last look rested on
+        self._everyone: Mapping[str, Claim] = {}
+        """Claims, as of that version of the replica's."""
+        self._everyone_as_of = -1
         self._comes_down = False
         """Whether it lands where it is, whatever home it is told to return to."""
         self._looks_again = False
@@ -316,7 +320,7 @@ class Airway(WayFlown):
         due_s = self.next_deadline_s()
         told = (self._way, self._wish, self._aside, self._halt.under_way, self._moves, self._aloft)
         placed = self._vehicle.enu_m is not None
-        now = (*self._replica.claims.values(), *told, placed, len(self._fleet.heard()))
+        now = (self._replica.claim_version, *told, placed, len(self._fleet.heard()))
         before, self._settled = self._settled, now
         return now != before or (due_s is not None and due_s <= now_s)
 
@@ -477,6 +481,10 @@ class Airway(WayFlown):
     # -- pieces -----------------------------------------------------------------------------------
 
     def _claims(self) -> Mapping[str, Claim]:
-        """Of everyone, the own one as it is about to be said."""
-        claims = self._replica.claims
-        return {**claims, self._uav: self.told(claims[self._uav])}
+        """Of everyone, the own one as it is about to be said: the same as long as none changes."""
+        claims, version = self._replica.claims, self._replica.claim_version
+        own = self.told(claims[self._uav])
+        if version != self._everyone_as_of or self._everyone[self._uav] != own:
+            self._everyone_as_of = version
+            self._everyone = MappingProxyType({**claims, self._uav: own})
+        return self._everyone

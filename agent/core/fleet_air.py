@@ -67,6 +67,7 @@ class FleetAir:
         self._peers = peers
         self._brief: MissionConfig | None = None
         self._air: SharedAir | None = None
+        self._others: frozenset[str] = frozenset()
         self._lost_s: dict[str, float] = {}
         """Who is lost, and since when [s mission time]."""
         self._zone_stay = ZoneStay(uav, replica, mission_view)
@@ -80,6 +81,8 @@ class FleetAir:
         if brief is not self._brief:
             self._brief = brief
             self._air = None if brief is None else air_of_brief(brief)
+            uavs = () if brief is None else brief.uavs
+            self._others = frozenset(uav.id for uav in uavs) - {self._uav}
         return self._air if self._mission_view.me is not None else None
 
     @property
@@ -285,12 +288,9 @@ class FleetAir:
 
     def note_losses(self) -> None:
         """Remember since when each of the fleet has been lost."""
-        present = self._peers.membership.present
-        for uav in () if self._brief is None else self._brief.uavs:
-            if uav.id == self._uav or uav.id in present:
-                self._lost_s.pop(uav.id, None)
-            else:
-                self._lost_s.setdefault(uav.id, self.mission_s)
+        lost = self._others - self._peers.membership.present
+        if lost != self._lost_s.keys():
+            self._lost_s = {uav: self._lost_s.get(uav, self.mission_s) for uav in sorted(lost)}
 
     def expired(self) -> set[str]:
         """Who was lost so long ago that it can't be in the air any more.

@@ -164,13 +164,7 @@ class NearTraffic(AgentPart):
         if not body.airborne:
             self._picture.forget(writer)
             return
-        word = TrafficWord(
-            body.position_enu_m,
-            body.velocity_enu_m_s,
-            body.path_enu_m,
-            body.speed_m_s,
-            Precedence(_GRADES[body.grade], body.rank, body.depth),
-        )
+        word = _word_of(body)
         if self._picture.hear(writer, word, now_s, age_s) and self._rules is not None:
             self._decide_at_s = min(self._decide_at_s, now_s + self._rules.tick_s)
 
@@ -427,6 +421,24 @@ class NearTraffic(AgentPart):
                 self._mission_view.clock.mission_s(now_s),
             )
         )
+
+
+_MOST_WORDS = 4096
+_words: dict[int, tuple[Nearby, TrafficWord]] = {}
+"""By identity: agents of one process hear the very same, and each word is made once for them."""
+
+
+def _word_of(body: Nearby) -> TrafficWord:
+    kept = _words.get(id(body))
+    if kept is not None and kept[0] is body:
+        return kept[1]
+    if len(_words) >= _MOST_WORDS:
+        _words.clear()
+    precedence = Precedence(_GRADES[body.grade], body.rank, body.depth)
+    flown = body.position_enu_m, body.velocity_enu_m_s, body.path_enu_m, body.speed_m_s
+    word = TrafficWord(*flown, precedence)
+    _words[id(body)] = body, word
+    return word
 
 
 _NEAR_HOME_M = 25.0

@@ -100,12 +100,14 @@ class StateSync(AgentPart):
         Nothing does where another UAV repeats what is known of it, or says where it is, and its
         word counts already.
         """
-        news = []
+        news, membership = [], self._peers.membership
         for message in event.messages:
-            counts = self._peers.membership.is_credible(message.writer)
-            near = isinstance(message.body, Nearby)
-            is_known = counts and (near or self._replica.known(message) is message)
-            if is_known and message.writer != COORDINATOR:
+            writer = message.writer
+            if writer == COORDINATOR or not membership.is_credible(writer):
+                news.append(message)
+            elif isinstance(message.body, Nearby):
+                membership.heard(writer, now_s)
+            elif self._replica.known(message) is message:
                 self._peers.heard(message, self._replica, now_s)
             else:
                 news.append(message)

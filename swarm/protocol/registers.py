@@ -113,6 +113,8 @@ class Replica:
         """Grows with every change of brief or board."""
         self.task_version = 0
         """Grows with every change of brief, board or outcomes."""
+        self.claim_version = 0
+        """Grows with every change of claims that count."""
         self.calibration_version = 0
         """Grows with every change of how UAVs of the brief fly."""
         self.reattempts = 0
@@ -261,6 +263,7 @@ class Replica:
             self._fleet = {uav.id for uav in brief.uavs}
             self._forget_strangers()
             self.claims.clear()
+            self.claim_version += 1
             self.claimants.clear()
             self.outcomes.clear()
             self.calibrations.clear()
@@ -299,6 +302,7 @@ class Replica:
 
     def _note_claim(self, uav: str, claim: Claim) -> None:
         before, self.claims[uav] = self.claims.get(uav), claim
+        self.claim_version += before != claim
         if before is not None and before.task is not None:
             rivals = self.claimants[before.task]
             del rivals[uav]

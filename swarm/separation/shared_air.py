@@ -48,6 +48,8 @@ class SharedAir:
         self._lined_up_but: Collection[str] = ()
         """And who was not in the air then."""
         self._lines_now: Sequence[Sequence[str | None]] = ()
+        self._holders_now: frozenset[str | None] = frozenset()
+        """Who sits anywhere by these: in a large fleet most do not."""
 
     # -- what is taken -------------------------------------------------------------------
 
@@ -136,6 +138,8 @@ class SharedAir:
     ) -> frozenset[int]:
         """Stacks in which ``uav`` has a seat."""
         lines = self._lines(claims, expired)
+        if uav not in self._holders_now:
+            return frozenset()
         return frozenset(
             stack for stack, line in zip(self._stack_of, lines, strict=True) if line[-1] == uav
         )
@@ -158,6 +162,7 @@ class SharedAir:
                 )
                 for seat, first in enumerate(self._first)
             ]
+            self._holders_now = frozenset(line[-1] for line in self._lines_now)
         return self._lines_now
 
     def _line(
@@ -232,9 +237,11 @@ class SharedAir:
         Those of its last word that are still its own, and others once it knows of all that those
         who sat there had granted, and what it has granted itself for other slabs fits in there.
         """
-        told = self.way(uav, claims).keeps
+        told, lines = self.way(uav, claims).keeps, self._lines(claims, expired)
+        if uav not in self._holders_now:
+            return ()
         found = []
-        for seat, (*before, now) in enumerate(self._lines(claims, expired)):
+        for seat, (*before, now) in enumerate(lines):
             if now != uav or not before:
                 continue
             known = all(each and self._is_settled(each, claims, heard, expired) for each in before)
@@ -336,6 +343,8 @@ class SharedAir:
         if any(self.way(uav, claims).number < number for uav, number in grants.items()):
             return grants  # an earlier life has granted what this one has not heard of
         mine, needed = self._sits_in(keeper, claims, heard, self._lines(claims, expired))
+        if not needed:
+            return grants
         binding = [grants, *self._binding(keeper, claims, expired)]
         waiting: list[Path] = []
         self._ways.look_at(claims)
@@ -371,6 +380,8 @@ class SharedAir:
         On the last seat of a slab it is not as long as all others there are heard.
         """
         mine, needed = set[int](), set[int]()
+        if keeper not in self._holders_now:
+            return frozenset(), frozenset()
         for stack, seats in zip(self._stacks, self._seats, strict=True):
             sitting = [self._sitting(seat, claims, lines) for seat in seats]
             if keeper in sitting:

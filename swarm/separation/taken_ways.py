@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 
@@ -55,6 +56,8 @@ class TakenWays:
         }
         self._paths: dict[str, tuple[ClaimedWay, Path, _Box]] = {}
         """By UAV, the way that was asked about last, as an array, and what holds it."""
+        self._looked_at: Mapping[str, Claim] | None = None
+        """Claims that were looked at last, if they can't have changed since."""
         self._seen: list[Claim | None] = []
         """By UAV, the claims that were looked at last."""
         self._boxes_m = np.empty((len(fleet), 2, 2))
@@ -109,7 +112,13 @@ class TakenWays:
         return [uav for uav in near if uav in self.asking]
 
     def look_at(self, claims: Mapping[str, Claim]) -> None:
-        """Find out what has changed: from word to word, and from agent to agent, it is little."""
+        """Find out what has changed: from word to word, and from agent to agent, it is little.
+
+        Of a `MappingProxyType`, which nobody may change, nothing has.
+        """
+        if claims is self._looked_at:
+            return
+        self._looked_at = claims if isinstance(claims, MappingProxyType) else None
         now, before = list(map(claims.get, self.uavs)), self._seen
         if now == before:
             return

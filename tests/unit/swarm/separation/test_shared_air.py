@@ -303,6 +303,8 @@ class Sky:
             self.say(name, ended, ClaimPhase.OUT)
         elif fate < 0.08 and self.lost:
             expired.add(str(rng.choice(sorted(self.lost))))
+            # That takes as long as its battery lasts: who is heard by then has long been heard of.
+            self.known[name].update(self.truth)
         elif fate < 0.14 and way.flies and len(way.path_enu_m) > 1:  # half of a piece is flown
             first, second, *rest = way.path_enu_m
             east_m, north_m, up_m = (0.5 * (a + b) for a, b in zip(first, second, strict=True))
