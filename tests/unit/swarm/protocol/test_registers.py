@@ -171,14 +171,19 @@ def test_of_equal_stamps_the_same_statement_stands_everywhere(order: list[Claim]
         max_size=20,
     )
 )
-def test_claimants_are_the_claims_by_task(events: list[tuple[str, str | None] | list[str]]) -> None:
+def test_claimants_are_the_claims_by_task_and_a_version_tells_when_claims_have_changed(
+    events: list[tuple[str, str | None] | list[str]],
+) -> None:
     replica = Replica()
     for counter, event in enumerate(events, 1):
+        before, version = dict(replica.claims), replica.claim_version
         if isinstance(event, list):
             replica.join(message(COORDINATOR, brief(*map(uav, event)), counter))
         else:
             claim = IDLE if event[1] is None else held(event[1], 0.0)
             replica.join(message(event[0], claim, counter))
+            assert (replica.claim_version != version) == (replica.claims != before)
+        assert replica.claim_version != version or replica.claims == before
 
         by_task: dict[str, dict[str, Claim]] = {}
         for name, each in replica.claims.items():

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from types import MappingProxyType
+
 import numpy as np
 import pytest
 
@@ -57,3 +59,21 @@ def test_who_looks_with_other_words_than_another_one_sees_what_they_say() -> Non
     assert ways.successions == {"u0": ((), True, "u1")}
     assert ways.near(place, {}) == ["u0"]
     assert ways.successions == {}
+
+
+def test_claims_that_may_change_are_looked_at_anew_and_those_that_cannot_only_once() -> None:
+    ways = TakenWays([Starter("u0", (0.0, 0.0, 30.0))], NEAR_M)
+    gone = Claim(ClaimPhase.OUT, None, 0.0, 0, 0.0, way=ClaimedWay(1, (), heir="u1"))
+    place = np.array([[0.0, 5.0, 30.0]])
+    claims = dict[str, Claim]()
+    assert ways.near(place, claims) == ["u0"]
+    claims["u0"] = gone
+    assert ways.near(place, claims) == []
+
+    there, left = MappingProxyType[str, Claim]({}), MappingProxyType({"u0": gone})
+    assert [ways.near(place, each) for each in (there, there, left, there)] == [
+        ["u0"],
+        ["u0"],
+        [],
+        ["u0"],
+    ]
