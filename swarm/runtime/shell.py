@@ -150,8 +150,8 @@ class Shell(Generic[E, A]):
         self._keys = KeySpace(mission)
         self._seal = bus.seal
         self._codec = Codec(mission, bus.seal, None if shared is None else shared.messages)
-        self._admission = AdmissionControl(self._keys, bus.seal, clock.now_s)
-        bus.inbox.admits = self._admission.admits
+        admission = self._admission = AdmissionControl(self._keys, bus.seal, clock.now_s)
+        bus.inbox.admits = admission.admits
         self._log = get_logger(name, mission=mission)
         self._questions = StateExchange(
             bus,
@@ -169,9 +169,7 @@ class Shell(Generic[E, A]):
         self._from_bus = from_bus
         self._execute = execute
         self._register = register
-        self._drop_count = DropCount(
-            bus.inbox, self._admission, left_out, self._codec.dropped, self._log
-        )
+        self._drops = DropCount(bus.inbox, admission, left_out, self._codec.dropped, self._log)
         self._save = save
         self._context = context
         self._loop = asyncio.get_running_loop()
@@ -202,7 +200,7 @@ class Shell(Generic[E, A]):
     @property
     def dropped(self) -> Mapping[str, int]:
         """Messages dropped so far, by reason."""
-        self._drop_count.take()
+        self._drops.take()
         return self._codec.dropped
 
     async def run(self) -> int:
@@ -414,7 +412,7 @@ class Shell(Generic[E, A]):
                 continue
             if self._turns is not None:
                 await self._turns.mine()
-            self._drop_count.take()
+            self._drops.take()
             while self._unread:
                 self._read(TURN)
                 if self._unread:  # the vehicle must not wait for a flood of words
