@@ -113,7 +113,8 @@ sanitize: $(VENV)/.installed-dev
 		LD_PRELOAD="$$(c++ -print-file-name=libasan.so) $$(c++ -print-file-name=libstdc++.so)" \
 		ASAN_OPTIONS=detect_leaks=0 UBSAN_OPTIONS=print_stacktrace=1 PYTHONMALLOC=malloc \
 		PYTHONPATH="$$($(CURDIR)/$(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("platlib"))')" \
-		$(CURDIR)/$(BIN)/python -S -m pytest -q --capture sys --timeout 600 tests/unit/swarm/kernels
+		$(CURDIR)/$(BIN)/python -S -m pytest -q --capture sys --timeout 600 tests/unit/swarm/kernels \
+		tests/unit/swarm/separation/test_traffic_glance.py
 
 # Bytecode is written by whoever imports a module first: of all the modules of all packages few are.
 PIP_INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-compile
