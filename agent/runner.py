@@ -1,9 +1,10 @@
 """The agent's process: its core between a bus and a vehicle.
 
-Publishes ``uav/<id>/claim``, ``…/outcome/<task>``, ``…/status`` and ``…/choice``, holds
+Publishes ``uav/<id>/claim``, ``…/outcome/<task>``, ``…/status`` and ``…/choice``, to some alone
+``uav/<id>/claim/<name>``, holds
 ``alive/<id>`` and answers on ``state/<id>``; subscribes to ``brief``, ``plan``,
-``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and ``operator/*`` and watches
-``alive/*``. Leaves out: every decision (agent.core.agent_core) and flying (agent.vehicle).
+``board/*``, ``uav/*/claim``, ``uav/*/claim/<id>``, ``uav/*/outcome/*`` and ``operator/*`` and
+watches ``alive/*``. Leaves out: every decision (agent.core.agent_core) and flying (agent.vehicle).
 """
 
 from __future__ import annotations
@@ -225,7 +226,7 @@ async def run_agent(
     flight = _Flight(
         core, bus, clock, mission, make_vehicle, save=save, answer_s=answer_s, shared=shared
     )
-    join_mission(bus, mission, core.uav, status=False)
+    join_mission(bus, mission, core.uav, status=False, addressed=True)
     loop = asyncio.get_running_loop()
     flying = loop.create_task(flight.shell.run())
     leaving = loop.create_task(_farewell(flight, flying, stop))

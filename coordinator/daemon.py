@@ -2,7 +2,8 @@
 
 Publishes ``brief``, ``plan`` and ``board/<task>``, holds ``alive/coordinator`` and answers on
 ``state/coordinator``; while it stands by, none of that. Subscribes to ``brief``, ``plan``,
-``board/*``, ``uav/*/claim``, ``uav/*/outcome/*`` and ``operator/*`` and watches ``alive/*``. One
+``board/*``, ``uav/*/claim``, ``uav/*/claim/coordinator``, ``uav/*/outcome/*`` and ``operator/*``
+and watches ``alive/*``. One
 that stands by takes a seat as an observer; when it takes over it keeps that seat. When it has to
 stand down, it leaves it and watches from a new one: a token cannot be taken back.
 """
@@ -37,7 +38,7 @@ from swarm.model.ids import COORDINATOR
 from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, Snapshot
 from swarm.protocol.seal import Seal
-from swarm.protocol.timing import PRESETS, LinkKind, Timing
+from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind, Timing
 from swarm.runtime.clock import Clock, SystemClock
 from swarm.runtime.joining import join_mission
 from swarm.runtime.log import get_logger
@@ -123,6 +124,8 @@ async def run_coordinator(
     ):  # agents of earlier releases cannot read it, which shows there alone
         bus.subscribe(KeySpace(mission.name).status("*"), latest=True)
     shell.suit_fleet(len(mission.uavs))
+    granted = KeySpace(mission.name).claim_to("*", COORDINATOR)
+    bus.subscribe(granted, gathered=len(mission.uavs) > UNSTRETCHED_UAVS)
     try:
         return await shell.run()
     finally:

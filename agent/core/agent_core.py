@@ -480,8 +480,10 @@ class AgentCore(AgentPart):
         for report in self._airway.settle(now_s):
             self._commander.hear(report, now_s)
             self._airway.settle(now_s)
-        if (restated := self._airway.restated()) is not None:
+        if (restated := self._airway.restated(speaks=self._speaks)) is not None:
             self._restate(restated)
+        if (granted := self._airway.granted(now_s)) is not None:
+            self._actions.append(self._announcer.say_to(*granted))
         self._near_traffic.settle(now_s)
 
     def _end_step(self, now_s: float) -> list[Action]:

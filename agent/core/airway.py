@@ -14,7 +14,6 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from types import MappingProxyType
 
 from agent.core.base_stand import BaseStand
 from agent.core.fleet_air import ASIDE_PATIENCE, GIVES_UP_S, STOP_LEG, FleetAir
@@ -47,10 +46,11 @@ from agent.core.way_flown import NO_LEG, WayFlown
 from agent.core.wish import Wish
 from swarm.protocol.events import LogLine
 from swarm.protocol.registers import Replica
-from swarm.protocol.timing import Timing
+from swarm.protocol.timing import Timing, earliest
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
-from swarm.separation.shared_air import SharedAir, adds_nothing
+from swarm.separation.shared_air import SharedAir
 from swarm.separation.shifted import continued, hovering, landed, left_of_way, lifted
+from swarm.separation.way_words import adds_nothing, grants_alone
 
 _BY_GRANT = GoTo | Return | Prepare
 """Orders that may have to wait for a way."""
@@ -82,12 +82,9 @@ class Airway(WayFlown):
         self._wish: Wish | None = None
         self._aside: Wish | None = None
         """It makes room, before its wish is asked again."""
-        self._kept = KeptAir(uav)
+        self._kept = KeptAir(uav, timing.announce_s)
         self._stand = BaseStand()
         self._settled: tuple[object, ...] = ()  # what the last look rested on
-        self._everyone: Mapping[str, Claim] = {}
-        """Claims, as of that version of the replica's."""
-        self._everyone_as_of = -1
         self._comes_down = False
         """Whether it lands where it is, whatever home it is told to return to."""
         self._looks_again = False
@@ -165,10 +162,8 @@ class Airway(WayFlown):
         vehicle is somewhere on that way, and stops there before anything else is asked for.
         """
         if self._way is None and claim.way is not None:
-            self._way = claim.way
+            self._recall_way(claim.way)
             self._kept.recall(claim.way)
-            self._aloft = bool(claim.way.path_enu_m) and not claim.way.grounded
-            self._moves = bool(claim.way.path_enu_m)
 
     # -- orders ----------------------------------------------------------------------------------
 
@@ -252,8 +247,7 @@ class Airway(WayFlown):
         """Nothing is asked for any more."""
         self._wish = self._aside = None
         self._goes_aside = False
-        if self._way is not None and not self._way.flies:
-            self._way = hovering(self._told_way)
+        self._ask_no_more()
 
     def _stop(self) -> None:
         """Stop where the vehicle was told to be last, which is on its way."""
@@ -304,13 +298,15 @@ class Airway(WayFlown):
             self._unplaced()
         self._fleet.note_losses()
         given_up = self._press(air, now_s)
-        self._kept.look(air, self._claims, self._fleet.heard(), self._fleet.expired())
+        self._kept.look(air, self._claims, self._fleet.heard(), self._fleet.expired(), now_s)
         self._depart_if_granted(air, now_s)
         return given_up
 
     def concerned(self, writer: str, said: Claim) -> bool:
         """Whether `settle` has something to do once ``writer`` has said so."""
-        air = self._fleet.shared
+        air, known = self._fleet.shared, self._replica.claims.get(writer)
+        if air is not None and known is not None and grants_alone(self._uav, said, known):
+            return False
         if air is None or self._kept.any or self._halt.under_way or self._aside is not None:
             return air is not None
         return air.concerns(self._uav, writer, said, self._replica.claims)
@@ -324,18 +320,38 @@ class Airway(WayFlown):
         before, self._settled = self._settled, now
         return now != before or (due_s is not None and due_s <= now_s)
 
-    def restated(self) -> Claim | None:
-        """The own claim, if what is to be told of the air has changed since it was said."""
-        claim = self._replica.claims.get(self._uav)
-        if self._fleet.shared is None or claim is None:
+    def restated(self, *, speaks: bool) -> Claim | None:
+        """The own claim, if what is to be told of the air has changed since it was said.
+
+        Where it ``speaks`` in this step in any case, all that is new is told with that.
+        """
+        air, claim = self._fleet.shared, self._replica.claims.get(self._uav)
+        if air is None or claim is None:
             return None
         now = self.told(self._stand.left(claim, self.last_departure.sortie_end_s()))
-        if adds_nothing(now.way, claim.way) and (now.base, now.stage) == (claim.base, claim.stage):
+        if (now.base, now.stage) == (claim.base, claim.stage) and (
+            adds_nothing(now.way, claim.way)
+            or (not speaks and self._fleet.can_wait(air, now, claim, self._claims()))
+        ):
             return None
         return now
 
+    def granted(self, now_s: float) -> tuple[Claim, list[str]] | None:
+        """The own claim as it was said, with what was granted since, and who is to hear it at once.
+
+        None: nobody is. All others hear it with the next word of this UAV.
+        """
+        air, claim = self._fleet.shared, self._replica.claims.get(self._uav)
+        if air is None or claim is None:
+            self._kept.tell_again_at_s = None
+            return None
+        return self._kept.told_to(claim, air, self._claims, self._fleet.expired(), now_s)
+
     def next_deadline_s(self) -> float | None:
         """When `settle` will next have something to do."""
+        return earliest(self._asks_again_at_s(), self._kept.tell_again_at_s)
+
+    def _asks_again_at_s(self) -> float | None:
         wish = self._aside or self._wish
         if self._unplaced is not None:
             return self._vehicle.awaited_until_s
@@ -481,10 +497,4 @@ class Airway(WayFlown):
     # -- pieces -----------------------------------------------------------------------------------
 
     def _claims(self) -> Mapping[str, Claim]:
-        """Of everyone, the own one as it is about to be said: the same as long as none changes."""
-        claims, version = self._replica.claims, self._replica.claim_version
-        own = self.told(claims[self._uav])
-        if version != self._everyone_as_of or self._everyone[self._uav] != own:
-            self._everyone_as_of = version
-            self._everyone = MappingProxyType({**claims, self._uav: own})
-        return self._everyone
+        return self._fleet.claims_with(self.told(self._replica.claims[self._uav]))

@@ -87,6 +87,12 @@ class Announcer:
                 self._news.add(message.key)
         return Publish(message)
 
+    def say_to(self, claim: Claim, to: Iterable[str]) -> Publish:
+        """State the own claim to those alone, if any; others hear it when it is said next."""
+        message = self._register_writer.say(claim)
+        self._replica.join(message)
+        return Publish(message, tuple(to))
+
     def stretch(self, stretch: float) -> None:
         """From now on repeat what is not new that much more seldom; see `stretch_of`."""
         self._stretch = stretch

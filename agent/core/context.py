@@ -80,14 +80,19 @@ class AgentPart:
         said = self._airway.told(body) if isinstance(body, Claim) else body
         self._actions.append(self._announcer.say(said))
 
+    def _is_own_claim(self, action: Action) -> bool:
+        """Whether the action says the own claim as it is, to everybody."""
+        claimed = self._announcer.claimed
+        return isinstance(action, Publish) and action.message is claimed and action.to is None
+
+    @property
+    def _speaks(self) -> bool:
+        """Whether this step says the own claim."""
+        return any(map(self._is_own_claim, self._actions))
+
     def _restate(self, claim: Claim) -> None:
         """State the own claim anew, in one word with what this step was to say of it before."""
-        claimed = self._announcer.claimed
-        kept = [
-            action
-            for action in self._actions
-            if not (isinstance(action, Publish) and action.message is claimed)
-        ]
+        kept = [action for action in self._actions if not self._is_own_claim(action)]
         unheard = len(kept) < len(self._actions)
         self._actions[:] = kept
         self._actions.append(self._announcer.say(self._airway.told(claim), instead=unheard))

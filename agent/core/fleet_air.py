@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
+from types import MappingProxyType
 
 import numpy as np
 
@@ -28,6 +29,7 @@ from swarm.separation.shifted import shifted_path
 from swarm.separation.slabs import apart
 from swarm.separation.straight_pieces import not_flown, thinned
 from swarm.separation.taken_ways import is_home
+from swarm.separation.way_words import ends_like
 
 STOP_LEG = 0
 """Of orders that are the airway's own; those of the core are numbered from 1."""
@@ -70,6 +72,9 @@ class FleetAir:
         self._others: frozenset[str] = frozenset()
         self._lost_s: dict[str, float] = {}
         """Who is lost, and since when [s mission time]."""
+        self._everyone: Mapping[str, Claim] = {}
+        """Claims, as of that version of the replica's."""
+        self._everyone_as_of = -1
         self._zone_stay = ZoneStay(uav, replica, mission_view)
         self.last_departure = LastDeparture(mission_view, self._zone_stay)
         self.layer = OwnLayer(replica, mission_view)
@@ -358,6 +363,40 @@ class FleetAir:
         wanted = (air.wanted(uav, air.way(uav, claims)) for uav in asking)
         helps = any(apart(air.slabs, np.array(left), each) for each in wanted)
         return bool(asking), left if helps else None
+
+    def can_wait(
+        self, air: SharedAir, now: Claim, said: Claim, claims: Mapping[str, Claim]
+    ) -> bool:
+        """Whether nobody needs to know ``now`` of this UAV's way before its next word.
+
+        That it has set off on what it was granted is told as it holds its task, which is soon; that
+        it has come to the end, as soon as somebody asks for what it has flown.
+
+        Args:
+            air: in which.
+            now: its claim as it is.
+            said: its claim as others know it.
+            claims: of everyone, the own one as it is about to be said.
+        """
+        way, known = now.way, said.way
+        if way is None or known is None or not ends_like(way, known):
+            return False
+        if way.flies != known.flies and said.phase is not ClaimPhase.PROPOSED:
+            return False
+        if len(way.path_enu_m) == len(known.path_enu_m):
+            return True
+        asking = air.in_the_way(self._uav, np.array(known.path_enu_m), claims, self.expired())
+        wanted = (air.wanted(uav, air.way(uav, claims)) for uav in asking)
+        left = np.array(way.path_enu_m)
+        return not any(apart(air.slabs, left, each) for each in wanted)
+
+    def claims_with(self, own: Claim) -> Mapping[str, Claim]:
+        """Claims of everyone, the ``own`` one that: the same object as long as none changes."""
+        claims, version = self._replica.claims, self._replica.claim_version
+        if version != self._everyone_as_of or self._everyone[self._uav] != own:
+            self._everyone_as_of = version
+            self._everyone = MappingProxyType({**claims, self._uav: own})
+        return self._everyone
 
     def reaches(self, uav: str) -> bool:
         """Whether ``uav`` could hear a request."""

@@ -231,7 +231,7 @@ class Tasking(AgentPart, ABC):
         self._note(f"task {result}", task.task, mission_s=ended_s)
 
     def _keep_or_lose_claim(self, now_s: float) -> None:
-        claim, attempt = self.claim, self._attempt
+        claim, attempt, waits = self.claim, self._attempt, self._airway.waits
         if claim is None or claim.task is None or self._machine.state in FREE:
             return
         if (lost := self._lost()) is not None:
@@ -239,8 +239,10 @@ class Tasking(AgentPart, ABC):
         elif attempt.ready_by_s is not None and attempt.ready_by_s <= now_s:
             self._release("the vehicle is not ready", now_s)
         elif attempt.held_at_s is not None and attempt.held_at_s <= now_s:
-            attempt.held_at_s = None
-            self._say(replace(claim, phase=ClaimPhase.HELD))
+            # While it waits for its way, for seconds at most: with its departure it is one word.
+            attempt.held_at_s = now_s + self._timing.objection_window_s if waits else None
+            if not waits:
+                self._say(replace(claim, phase=ClaimPhase.HELD))
 
     def _divert(self, now_s: float) -> None:
         """Leave the task for a better one, unless somebody free is about to take that."""

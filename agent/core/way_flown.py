@@ -15,7 +15,7 @@ from agent.core.stop_on_way import StopOnWay
 from swarm.protocol.fields import Point
 from swarm.protocol.timing import Timing
 from swarm.protocol.uav_messages import ClaimedWay
-from swarm.separation.shifted import nominal
+from swarm.separation.shifted import hovering, nominal
 
 NO_LEG = -1
 """What is flown by a vehicle that does not fly as it was told."""
@@ -34,6 +34,8 @@ class WayFlown:
         self._mission_view = mission_view
         self._fleet = fleet
         self._way: ClaimedWay | None = None
+        self._recalled: ClaimedWay | None = None
+        """The way of an earlier life, which may have asked for it or be anywhere on it."""
         self._aloft = self._moves = False
         """Whether the vehicle is in the air, and may be anywhere on its way."""
         self._halt = StopOnWay(timing.patience_s)
@@ -51,6 +53,17 @@ class WayFlown:
         """Where the vehicle can be stopped, in the layer of the brief [m]; None: as it tells."""
         here = self._vehicle.enu_m if self._fleet.shared is not None and self._aloft else None
         return None if here is None else self._nominal(here)
+
+    def _recall_way(self, way: ClaimedWay) -> None:
+        """An earlier life said so last."""
+        self._way = self._recalled = way
+        self._aloft = bool(way.path_enu_m) and not way.grounded
+        self._moves = bool(way.path_enu_m)
+
+    def _ask_no_more(self) -> None:
+        """Ask for no way, unless the vehicle may be on that."""
+        if self._way is not None and not self._way.flies and self._way is not self._recalled:
+            self._way = hovering(self._told_way)
 
     def _end_leg(self) -> None:
         """The vehicle hovers at the end of its way, or where it was to stop on it."""

@@ -62,8 +62,8 @@ class Network(Protocol):
         """Who has been an observer shows the token of ``writer`` and answers for it."""
         ...
 
-    def publish(self, sender: Node, message: Message) -> None:
-        """``sender`` says ``message``."""
+    def publish(self, sender: Node, message: Message, to: Collection[str] | None = None) -> None:
+        """``sender`` says ``message``, to those alone; None: to everybody."""
         ...
 
     def ask(self, asker: Node, of: Collection[str] = ()) -> None:
@@ -105,7 +105,7 @@ class IdealNetwork:
         seat.writer = writer
         self._tell_all(PeerSeen(writer), seat)
 
-    def publish(self, sender: Node, message: Message) -> None:
+    def publish(self, sender: Node, message: Message, to: Collection[str] | None = None) -> None:
         """Tell everyone whom it concerns.
 
         Tasks that are put on the board one right after the other are heard together: to look at
@@ -117,7 +117,7 @@ class IdealNetwork:
 
         def tell() -> None:
             for seat in tuple(self._seats):
-                if seat is not sender and concerns(message, seat):
+                if seat is not sender and concerns(message, seat, to):
                     seat.receive(MessageReceived(message))
 
         self._later(tell)
@@ -168,9 +168,12 @@ class IdealNetwork:
         self._queue.after(self._latency_s, callback)
 
 
-def concerns(message: Message, seat: Node) -> bool:
+def concerns(message: Message, seat: Node, to: Collection[str] | None = None) -> bool:
     """Whether who sits there has subscribed to that: status and choices are for observers, what
-    UAVs say to those near them is for who has tuned in to their cell."""
+    UAVs say to those near them is for who has tuned in to their cell, what is said to some is for
+    them alone."""
+    if to is not None and seat.writer not in to:
+        return False
     match message.body:
         case Status() | Choice():
             return seat.writer is None

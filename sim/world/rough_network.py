@@ -112,11 +112,11 @@ class RoughNetwork:
             if viewer is not seat:
                 self._queue.after(self._conditions.latency_s, partial(self._show, viewer, seat))
 
-    def publish(self, sender: Node, message: Message) -> None:
+    def publish(self, sender: Node, message: Message, to: Collection[str] | None = None) -> None:
         """Tell everyone whom it concerns and reaches."""
         fact = MessageReceived(message)
         for seat in self._seats:
-            if seat is not sender and concerns(message, seat):
+            if seat is not sender and concerns(message, seat, to):
                 self._send(sender, seat, fact)
 
     def ask(self, asker: Node, of: Collection[str] = ()) -> None:

@@ -8,7 +8,7 @@ network on which more goes wrong, and clocks that disagree.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -277,8 +277,8 @@ class World:
         if process.over:
             return
         match action:
-            case Publish(message):
-                self._publish(process, message)
+            case Publish(message, to):
+                self._publish(process, message, to)
             case PublishLast(make):
                 self._publish(process, make())
             case OrderVehicle(order):
@@ -330,7 +330,9 @@ class World:
         self._end(process)
         self._watch.raised(process, fault)
 
-    def _publish(self, process: Process, message: Message) -> None:
+    def _publish(
+        self, process: Process, message: Message, to: Collection[str] | None = None
+    ) -> None:
         running = isinstance(message.body, PlanEpoch) and message.body.phase is MissionPhase.RUNNING
         if running and self.zero_s is None:
             self.zero_s = self.queue.now_s()
@@ -345,7 +347,7 @@ class World:
             self.flight_log.attempt_ended(process.name, message.body, *times_s)
         elif isinstance(message.body, Status):
             message = replace(message, body=self._as_flown(process.name, message.body))
-        self.network.publish(process, message)
+        self.network.publish(process, message, to)
         if self._watch is not None:
             self._watch.said(process, message)
 

@@ -156,8 +156,8 @@ def _limit(name: str, message: str, rates: Iterable[tuple[str, float]]) -> dict[
 
 def _sizes(keys: KeySpace) -> list[dict[str, Any]]:
     """How long what is said may be; any process would drop what is longer."""
-    small = [keys.claim("*"), keys.status("*"), keys.outcome("*", "*"), keys.calibration("*")]
-    small += [f"{keys.root}/operator/**", keys.near("*", "*", "*")]
+    small = [keys.claim("*"), keys.claim_to("*", "*"), keys.status("*"), keys.near("*", "*", "*")]
+    small += [keys.outcome("*", "*"), keys.calibration("*"), f"{keys.root}/operator/**"]
     large = [f"{keys.root}/**"]
     return [
         _size("small", "put", small, SMALL_LIMIT_BYTES + ENVELOPE_BYTES),

@@ -171,11 +171,14 @@ class Codec:
     def decode(self, key: str, data: bytes, known: Message | None = None) -> Message | None:
         """The message in ``data``, heard on ``key``; None when it must be dropped.
 
+        A claim may be heard on the key of its register or on one for somebody alone.
+
         It is ``known`` itself, of that key and believed before, where that is only repeated: most
         of what a large fleet says.
         """
         if known is not None and data == (known.said if self._seal is None else known.envelope):
             return known
+        key = self._keys.register_of(key)
         heard = None if self._shared is None else self._shared.find(data)
         if heard is not None and heard.key == key:
             return heard

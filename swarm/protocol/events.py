@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import Message, Snapshot
 
 
@@ -94,6 +95,17 @@ class Publish:
     """Say this on its key."""
 
     message: Message
+    to: tuple[str, ...] | None = None
+    """Of a claim, who alone is to hear it now, maybe nobody; all others hear it with a later word.
+    None: it is said to everybody."""
+
+    @property
+    def keys(self) -> tuple[str, ...]:
+        """On which it is said."""
+        if self.to is None:
+            return (self.message.key,)
+        keys, writer = KeySpace(self.message.mission), self.message.writer
+        return tuple(keys.claim_to(writer, each) for each in self.to)
 
 
 @dataclass(frozen=True, slots=True)

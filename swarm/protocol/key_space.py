@@ -68,6 +68,10 @@ class KeySpace:
         """What a UAV is about to do; ``*`` for all."""
         return f"{self.root}/uav/{uav}/claim"
 
+    def claim_to(self, uav: str, other: str) -> str:
+        """Where a UAV says its claim to one other alone; ``*`` for all."""
+        return f"{self.claim(uav)}/{other}"
+
     def outcome(self, uav: str, task: str) -> str:
         """How a UAV's attempt at a task ended; ``*`` for all."""
         return f"{self.root}/uav/{uav}/outcome/{task}"
@@ -116,6 +120,16 @@ class KeySpace:
         """Where a process answers with the registers it answers for; ``*`` for all."""
         return f"{self.root}/state/{writer}"
 
+    def register_of(self, key: str) -> str:
+        """The key of the register that is told of on ``key``: claims may be said to one alone."""
+        if "/claim/" not in key:
+            return key
+        match key.removeprefix(f"{self.root}/").split("/"):
+            case ["uav", uav, "claim", _]:
+                return self.claim(uav)
+            case _:
+                return key
+
     def writer_of(self, key: str) -> str | None:
         """Whose register ``key`` is; None if it is none of this mission."""
         match key.removeprefix(f"{self.root}/").split("/"):
@@ -125,7 +139,7 @@ class KeySpace:
                 return OPERATOR
             case ["roster"]:
                 return AUTHORITY
-            case ["uav", writer, _] | ["uav", writer, "outcome", _]:
+            case ["uav", writer, _] | ["uav", writer, "outcome" | "claim", _]:
                 return writer
             case ["uav", writer, "near", _, _]:
                 return writer

@@ -12,7 +12,13 @@ def gathered_keys(keys: KeySpace) -> tuple[str, ...]:
 
 
 def join_mission(
-    bus: Bus, mission: str, name: str | None, *, status: bool, every_status: bool = False
+    bus: Bus,
+    mission: str,
+    name: str | None,
+    *,
+    status: bool,
+    every_status: bool = False,
+    addressed: bool = False,
 ) -> None:
     """Subscribe to what every process of a mission needs, and show that this one is there.
 
@@ -28,6 +34,7 @@ def join_mission(
             an observer.
         status: subscribe to ``uav/*/status`` too, newest first, and to ``uav/*/choice``.
         every_status: of status keep all there is, for who records, not the newest alone.
+        addressed: subscribe to ``uav/*/claim/<name>``, what UAVs claim and say to it alone.
     """
     keys = KeySpace(mission)
     for key_expr in (
@@ -49,6 +56,8 @@ def join_mission(
         bus.subscribe(keys.choice("*"))
     if bus.seal is not None:
         bus.subscribe(keys.roster)
+    if addressed and name is not None:
+        bus.subscribe(keys.claim_to("*", name))
     bus.watch_tokens(keys.alive("*"))
     if name is not None:
         bus.serve(keys.state(name))

@@ -322,7 +322,7 @@ class Shell(Generic[E, A]):
     def _carry_out(self, action: A) -> None:
         match action:
             case Publish(message):
-                self._publish(message)
+                self._publish(message, action.keys)
             case PublishLast(make):
                 self._publish(make())
             case Ask(of):
@@ -343,11 +343,12 @@ class Shell(Generic[E, A]):
             case _:
                 self._execute(action)
 
-    def _publish(self, message: Message) -> None:
+    def _publish(self, message: Message, keys: Sequence[str] | None = None) -> None:
         reliable = not isinstance(message.body, News)
         packed = self._codec.pack(message)
         if packed is not None:
-            self._bus.publish(message.key, packed, reliable=reliable)
+            for key in (message.key,) if keys is None else keys:
+                self._bus.publish(key, packed, reliable=reliable)
 
     def _tune_in(self, cells: frozenset[Cell]) -> None:
         """Hear what is said in these cells, of each UAV the newest, and in no others."""
@@ -410,13 +411,19 @@ class Shell(Generic[E, A]):
             self._unread.extend(self._bus.inbox.take())
             if not self._unread:  # it was gathered meanwhile
                 continue
-            if self._turns is not None:
+            if self._turns is not None and not self._tells_time():
                 await self._turns.mine()
             self._drops.take()
             while self._unread:
                 self._read(TURN)
                 if self._unread:  # the vehicle must not wait for a flood of words
                     await asyncio.sleep(0)
+
+    def _tells_time(self) -> bool:
+        """Whether a word is there by which the time of the mission is known: waiting ages it."""
+        return any(
+            isinstance(each, Sample) and each.key == self._keys.plan for each in self._unread
+        )
 
     def _read(self, most: int) -> None:
         """Let the core hear the oldest that it has not, so many at most."""
@@ -446,7 +453,8 @@ class Shell(Generic[E, A]):
 
     def _message(self, sample: Sample) -> Message | None:
         """What was said, if it is to be believed."""
-        message = self._codec.decode(sample.key, sample.payload, self._register(sample.key))
+        known = self._register(self._keys.register_of(sample.key))
+        message = self._codec.decode(sample.key, sample.payload, known)
         if message is None:
             return None
         self._tell_newer()

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import replace
 
 from swarm.protocol.messages import MissionConfig
 from swarm.protocol.uav_messages import Claim, ClaimedWay, ClaimPhase
@@ -143,6 +142,16 @@ class SharedAir:
         return frozenset(
             stack for stack, line in zip(self._stack_of, lines, strict=True) if line[-1] == uav
         )
+
+    def beside(
+        self, uav: str, claims: Mapping[str, Claim], expired: Collection[str]
+    ) -> frozenset[str]:
+        """Who else has a seat where ``uav`` has one."""
+        lines, mine = self._lines(claims, expired), self.stacks_of(uav, claims, expired)
+        holders = {
+            line[-1] for stack, line in zip(self._stack_of, lines, strict=True) if stack in mine
+        }
+        return frozenset(each for each in holders if each is not None and each != uav)
 
     def _lines(
         self, claims: Mapping[str, Claim], expired: Collection[str]
@@ -440,16 +449,6 @@ def strength(uav: str, claims: Mapping[str, Claim]) -> tuple[bool, float, str]:
     if claim is None:
         return False, 0.0, uav
     return claim.task is not None, claim.decided_s, uav
-
-
-def adds_nothing(now: ClaimedWay | None, said: ClaimedWay | None) -> bool:
-    """Whether ``now`` tells nothing beyond what was ``said``: that can wait for the next word.
-
-    A grant of a request that is over may be left out, and is worth nothing where it is not.
-    """
-    if now is None or said is None or now is said:
-        return now is said
-    return now.grants.items() <= said.grants.items() and replace(now, grants=said.grants) == said
 
 
 def _majority(seats: int) -> int:

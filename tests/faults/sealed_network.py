@@ -8,7 +8,7 @@ are (tests.chaos.insider), and rosters that differ between processes.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 
 from sim.world.engine import EventQueue
 from sim.world.network import NetworkConditions, Node
@@ -55,14 +55,14 @@ class SealedNetwork(RoughNetwork):
         self._seal = ear
         self._questions = 0
 
-    def publish(self, sender: Node, message: Message) -> None:
+    def publish(self, sender: Node, message: Message, to: Collection[str] | None = None) -> None:
         """Tell everyone it reaches what is left of ``message`` behind the seals."""
         packed = self._codec(message.writer).pack(message)
         if packed is not None:
             self.overheard(message.key, packed)
             heard = self.ear.decode(message.key, packed)
             if heard is not None:
-                super().publish(sender, heard)
+                super().publish(sender, heard, to)
 
     def lie(self, key: str, data: bytes) -> None:
         """Somebody puts ``data`` on ``key``; nobody is parted from who lies."""

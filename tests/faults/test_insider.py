@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -215,9 +216,9 @@ class Storm(RoughNetwork):
         self.lost = 0
         self._limiter = RateLimiter(1.5, 4)
 
-    def publish(self, sender: Node, message: Message) -> None:
+    def publish(self, sender: Node, message: Message, to: Collection[str] | None = None) -> None:
         if self._limiter.allows(message.writer, self._queue.now_s()):
-            super().publish(sender, message)
+            super().publish(sender, message, to)
         else:
             self.lost += 1
 

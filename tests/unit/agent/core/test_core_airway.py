@@ -90,3 +90,21 @@ def test_who_may_be_on_its_way_up_keeps_that_air_until_it_has_landed() -> None:
     assert not lets_through(agent)
     agent.happen(Home())
     assert is_home(own_claim(agent))
+
+
+def test_who_may_have_set_off_in_an_earlier_life_keeps_the_way_that_it_asked_for() -> None:
+    """That life may have died before it said so."""
+    before = on_the_ground()
+    asked = ClaimedWay(5, (ABOVE_START, (40.0, 0.0, 10.0)))
+    agent = before.reborn()
+    agent.see(COORDINATOR, "u1")
+    said = agent.statement("u0", Claim(ClaimPhase.HELD, "t0", 1.0, 0, 9.0, way=asked))
+    agent.learn(agent.statement(COORDINATOR, agent.brief), said)
+
+    command(agent, CommandKind.HOLD)
+    agent.happen(Held())
+
+    way = own_claim(agent).way
+    assert way is not None
+    assert own_claim(agent).phase is ClaimPhase.PAUSED
+    assert (way.path_enu_m, way.number, way.flies) == (asked.path_enu_m, 5, False)

@@ -389,3 +389,16 @@ def test_a_token_goes_only_with_the_last_process_that_holds_it() -> None:
     net.network.leave(twin)
     net.after(1.0)
     assert kinds(net.seats["b"].since(begin_s)) == {PeerGone("a")}
+
+
+def test_what_is_said_to_some_is_heard_by_them_alone() -> None:
+    net = Net()
+    observer = Listener(net.queue, "onlooker", None)
+    net.network.join(observer)
+    net.after(UP_S)
+    message = said("a", 1)
+    net.network.publish(net.seats["a"], message, ("b",))
+    net.after(1.0)
+
+    assert (net.heard("b"), net.heard("c")) == ([1], [])
+    assert MessageReceived(message) not in observer.since(0.0)

@@ -210,6 +210,7 @@ def test_questions_by_way_of_another_router_are_not_limited_as_if_one_asked_them
     ("message", "key", "longest"),
     [
         ("put", KEYS.claim("uav1"), SMALL_LIMIT_BYTES + ENVELOPE_BYTES),
+        ("put", KEYS.claim_to("uav1", "uav2"), SMALL_LIMIT_BYTES + ENVELOPE_BYTES),
         ("put", KEYS.status("uav1"), SMALL_LIMIT_BYTES + ENVELOPE_BYTES),
         ("put", KEYS.outcome("uav1", "t1"), SMALL_LIMIT_BYTES + ENVELOPE_BYTES),
         ("put", KEYS.operator("fleet"), SMALL_LIMIT_BYTES + ENVELOPE_BYTES),

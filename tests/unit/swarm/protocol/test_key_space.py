@@ -60,3 +60,22 @@ def test_a_mission_is_found_by_any_of_its_tokens() -> None:
 @pytest.mark.parametrize("key", ["", "swarm/test", "swarm/test/alive/u0/x", "swarm/*/alive/u0"])
 def test_other_keys_show_no_mission(key: str) -> None:
     assert mission_of_token(key) is None
+
+
+def test_a_claim_said_to_one_alone_is_of_the_same_register_and_writer() -> None:
+    keys = KeySpace(MISSION)
+    alone = keys.claim_to("u0", "u1")
+
+    assert keys.register_of(alone) == keys.claim("u0")
+    assert keys.writer_of(alone) == "u0"
+    assert not zenoh.KeyExpr(keys.claim("*")).includes(alone)
+    assert zenoh.KeyExpr(keys.claim_to("*", "u1")).includes(alone)
+    assert not zenoh.KeyExpr(keys.claim_to("*", "u2")).includes(alone)
+
+
+@pytest.mark.parametrize(
+    "key",
+    ["", "swarm/test/uav/u0/claim", "swarm/test/uav/u0/claim/u1/x", "swarm/other/uav/u0/claim/u1"],
+)
+def test_other_keys_are_their_own_registers(key: str) -> None:
+    assert KeySpace(MISSION).register_of(key) == key

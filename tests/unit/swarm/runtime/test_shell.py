@@ -102,6 +102,67 @@ def test_what_is_said_last_is_put_together_after_all_else_and_heard_by_onlookers
     play(scenario)
 
 
+def test_what_is_said_to_some_goes_to_each_of_them_alone() -> None:
+    said = message("u0", held("t0", 1.0))
+
+    async def scenario() -> None:
+        core = ScriptedCore(lambda fact: [Publish(said, ("u1", "u2"))] if fact == Tick() else ())
+        async with at_work(core) as played:
+            for key in (KEYS.claim("*"), KEYS.claim_to("*", "u1"), KEYS.claim_to("*", "u2")):
+                played.other.subscribe(key)
+            played.shell.step(Tick())
+            last = Sample(KEYS.claim_to("u0", "u2"), encode(said))
+            heard: list[object] = []
+
+            def come(events: Sequence[object]) -> bool:
+                heard[:] = [event for event in events if isinstance(event, Sample)]
+                return last in events
+
+            await take_until(played.other, come)
+            assert heard == [Sample(KEYS.claim_to("u0", "u1"), encode(said)), last]
+
+    play(scenario)
+
+
+def test_what_is_said_to_nobody_is_not_said() -> None:
+    said = message("u0", held("t0", 1.0))
+
+    async def scenario() -> None:
+        core = ScriptedCore(
+            lambda fact: (
+                [Publish(said, ()), Publish(message("u0", done("t0")))] if fact == Tick() else ()
+            )
+        )
+        async with at_work(core) as played:
+            played.other.subscribe(f"{KEYS.root}/**")
+            played.shell.step(Tick())
+            first: list[str] = []
+
+            def come(events: Sequence[object]) -> bool:
+                first[:] = [event.key for event in events if isinstance(event, Sample)]
+                return bool(first)
+
+            await take_until(played.other, come)
+            assert set(first) == {KEYS.outcome("u0", "t0")}
+
+    play(scenario)
+
+
+def test_a_claim_said_to_this_process_alone_is_heard_as_any_other() -> None:
+    said = message("u1", held("t0", 1.0))
+
+    async def scenario() -> None:
+        core = ScriptedCore()
+        async with at_work(core) as played:
+            played.seat.subscribe(KEYS.claim_to("*", "u0"))
+            played.other.publish(KEYS.claim_to("u2", "u0"), encode(said))
+            played.other.publish(KEYS.claim_to("u1", "u0"), encode(said))
+            await until(lambda: MessageReceived(said) in core.heard, "hearing it")
+            assert played.shell.dropped == {"said on another's key": 1}
+
+    play(scenario)
+
+
 def test_what_the_core_has_no_room_for_is_counted_and_told_once(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
