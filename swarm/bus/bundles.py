@@ -24,7 +24,7 @@ import msgpack
 
 from swarm.protocol.timing import UNSTRETCHED_UAVS
 
-BUNDLE_S: Final = 0.1
+BUNDLE_S: Final = 0.05
 """How often what has come is said together [wall s]."""
 ALIVE_S: Final = 0.5
 """An empty bundle is said when none was for so long: it proves that the bundler lives."""

@@ -93,6 +93,9 @@ class SharedSeats:
         self._dropped = 0
         self._gathered_s = -math.inf
         """When the bus was last asked for what waits, in the loop's time."""
+        self._rounds = 0
+        """How often something was handed round, each time beginning with another seat: who always
+        comes after dozens of others takes the time of a mission to be earlier than it is."""
         self._unsaid: list[Sample] = []
         """What is to be said on the bus with the next that must not be lost, or soon."""
 
@@ -285,10 +288,15 @@ class SharedSeats:
         if matching is None:
             if len(self._matching) >= _MOST_KEYS:
                 self._matching.clear()
-            matching = [each for each in self._subscribed if _matches(each, sample.key)]
+            ends = "*", sample.key.rpartition("/")[2]  # what is for one of dozens ends in its name
+            maybe = [each for each in self._subscribed if each.endswith(ends)]
+            matching = [each for each in maybe if _matches(each, sample.key)]
             self._matching[sample.key] = matching
+        self._rounds += 1
         for key_expr in matching:
-            for seat, how in self._hearers[key_expr]:
+            hearers = self._hearers[key_expr]
+            first = self._rounds % len(hearers)
+            for seat, how in (*hearers[first:], *hearers[:first]):
                 if seat is but:
                     continue
                 if how.gathered:

@@ -12,7 +12,7 @@ from swarm.protocol.encoding import encode
 from swarm.protocol.events import CommonEvent, LinkChanged, MessageReceived, Tick
 from swarm.runtime.turns import SharedProcess, Turns
 from tests.support.builders import epoch, message
-from tests.support.scripted_shell import Action, ScriptedCore, at_work
+from tests.support.scripted_shell import CLAIM, Action, ScriptedCore, at_work
 from tests.support.shell_play import play, until
 
 PLACE, LATER_PLACE, NEWS = LinkChanged(True), LinkChanged(False), Tick()
@@ -108,6 +108,29 @@ def test_what_comes_to_press_while_it_waits_for_its_turn_is_done_then(
             assert turns_left > 900
             await until(lambda: not turns_left, "the turns of others")
             assert core.heard == [LATER_PLACE]
+
+    play(scenario)
+
+
+@pytest.mark.parametrize("tells_time", [False, True])
+def test_words_wait_for_their_turn_but_those_by_which_the_time_is_known(tells_time: bool) -> None:
+    async def scenario() -> None:
+        shared, core, turns_left = SharedProcess(), ScriptedCore(), 1000
+
+        def others() -> None:
+            nonlocal turns_left
+            turns_left -= 1
+
+        async with at_work(core, shared=shared) as played:
+            await asyncio.sleep(0)
+            for _ in range(turns_left):
+                shared.turns.put_off(others)
+            core.heard.clear()
+            said = EPOCH if tells_time else CLAIM
+            played.other.publish(said.key, encode(said))
+            await until(lambda: bool(core.heard), "hearing it")
+
+            assert (turns_left > 900) is tells_time
 
     play(scenario)
 
