@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import math
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from typing import Protocol
 
 from coordinator.mission_view.mission_state import MissionState
@@ -103,12 +103,14 @@ def observer_shell(
     answer_s: float = PRESETS[LinkKind.NORMAL].answer_s,
     *,
     every_status: bool = False,
+    known: Callable[[], Mapping[str, int]] = dict,
     left_out: Callable[[], int] = int,
 ) -> Shell[CommonEvent, CommonAction]:
     """A shell that tells ``core`` all that is said on the bus; it shows no token.
 
     ``name`` is that of this process, in logs and, where it speaks, as a writer. A question waits
-    ``answer_s`` for the slowest answer [wall s].
+    ``answer_s`` for the slowest answer [wall s]. Who looks on for long, and asks more than once,
+    tells what is ``known`` (`Replica.digest`): answers leave that out.
     """
     shell: Shell[CommonEvent, CommonAction] = Shell(
         core,
@@ -119,6 +121,7 @@ def observer_shell(
         from_bus=lambda fact: fact,
         execute=lambda _: None,
         snapshot=None,
+        known=known,
         left_out=left_out,
         answer_s=answer_s,
     )
@@ -170,7 +173,8 @@ async def watch(
         name = mission or config.mission or await only_mission(bus, limit_s)
         observer = MissionObserver(name, timing, None)
         mission_state = observer.mission_state
-        shell = observer_shell(observer, bus, clock, name, "status")
+        digest = mission_state.replica.digest
+        shell = observer_shell(observer, bus, clock, name, "status", known=digest)
         looking = asyncio.get_running_loop().create_task(shell.run())
         give_up_at_s = clock.now_s() + limit_s * clock.speedup
         deserted_at_s = math.inf

@@ -109,6 +109,7 @@ class LiveMission:
             mission,
             OPERATOR,
             self._network.answer_s,
+            known=replica.digest,
             left_out=lambda: replica.overfull,
         )
         self._log.info("looking on", mission=mission)

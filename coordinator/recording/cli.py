@@ -100,9 +100,12 @@ def record(
             with recording_to(file, about, wall_ns(), _warn) as recorder:
                 begun = recorder
                 print(f"recording {name} in {file}", file=sys.stderr)
-                core = recorder.around(witness, witness.observer.mission_state)
+                mission_state = witness.observer.mission_state
+                core = recorder.around(witness, mission_state)
                 shell = observer_shell(
-                    core, place, clock, name, "record", network.answer_s, every_status=True
+                    *(core, place, clock, name, "record", network.answer_s),
+                    every_status=True,
+                    known=mission_state.replica.digest,
                 )
                 try:
                     await shell.run()

@@ -340,6 +340,7 @@ async def _watching(run: Run) -> AsyncIterator[None]:
         from_bus=lambda fact: fact,
         execute=lambda _: None,
         snapshot=None,
+        known=run.mission_state.replica.digest,
         register=run.mission_state.replica.register,
         left_out=lambda: run.mission_state.replica.overfull,
     )
