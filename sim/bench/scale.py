@@ -11,9 +11,10 @@ no way, and by that observer, to the next claim. Linux alone tells all of it.
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import os
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import AsyncIterator, Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -30,9 +31,12 @@ from sim.bench.turnaround import told_turnarounds
 from sim.fleet.child_process import ChildProcess
 from sim.fleet.layout import BusKind
 from sim.fleet.run import Run, open_run
+from swarm.bus.port import Inbox
+from swarm.bus.zenoh_bus import open_zenoh_bus
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.encoding import NAMES
 from swarm.protocol.events import CommonAction, CommonEvent, MessageReceived
+from swarm.protocol.key_space import KeySpace
 from swarm.protocol.messages import MissionPhase, Stamp
 from swarm.protocol.timing import LinkKind
 from swarm.protocol.uav_messages import Choice, Claim, Outcome, Status
@@ -296,9 +300,10 @@ class MessageCount:
         self.heard: Counter[tuple[bool, str]] = Counter()
         """By whether a UAV has said so, and by kind."""
         self.new_claims = 0
-        """Claims that were no repetition."""
-        self._claimed: dict[str, Stamp] = {}
-        """By UAV, the newest of its claims."""
+        """Claims that tell all of anything new: not repetitions, nor what was granted, which those
+        whom it concerns have been told before."""
+        self._claimed: dict[str, tuple[Stamp, Claim]] = {}
+        """By UAV, the newest of its claims, but for grants."""
         self.there: set[str] = set()
         """UAVs that have told their status."""
         self.latency_ms: list[float] = []
@@ -321,10 +326,15 @@ class MessageCount:
             if isinstance(said.body, Status):
                 self.there.add(said.writer)
             elif isinstance(said.body, Claim):
-                before = self._claimed.get(said.writer)
-                if before is None or before < said.stamp:
-                    self.new_claims += 1
-                    self._claimed[said.writer] = said.stamp
+                self._hear_claim(said.writer, said.stamp, said.body)
+
+    def _hear_claim(self, uav: str, stamp: Stamp, claim: Claim) -> None:
+        if claim.way is not None:
+            claim = replace(claim, way=replace(claim.way, grants={}))
+        before = self._claimed.get(uav)
+        if before is None or before[0] < stamp:
+            self.new_claims += before is None or before[1] != claim
+            self._claimed[uav] = stamp, claim
 
     def log(self, name: str, line: str, now_s: float) -> None:
         """Take from a line of a log what it tells of decisions."""
@@ -366,7 +376,7 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
             log_format=LogFormat.JSON,
             start_timeout_s=settings.start_limit_s,
         )
-        async with open_run(mission, options, recorder=count) as run:
+        async with open_run(mission, options, recorder=count) as run, _addressed(run) as to_some:
             left_s = settings.start_limit_s - (clock.now_s() - begun_s)
             up = await _happens(run, lambda: len(count.there) == n_uav, left_s, "all agents")
             up_s = clock.now_s() - begun_s if up else None
@@ -378,10 +388,12 @@ async def _fly(n_uav: int, settings: ScaleSettings, tell: Progress) -> ScaleRun:
             airborne_s = clock.now_s() - begun_s if runs else None
             tell(f"{n_uav} UAVs: flying")
             heard, new, used = count.heard.copy(), count.new_claims, _used_s(run)
+            to_some.take()
             at_s = clock.now_s()
             await asyncio.sleep(settings.watch_s)  # what one does that never takes off is told, too
             watched_s = clock.now_s() - at_s
             said, new_claims = count.heard - heard, count.new_claims - new
+            said[True, TO_SOME] = len(to_some.take())
             shares = tuple(
                 share_bytes(child.pid) // agents
                 for child in _living(run)
@@ -425,13 +437,26 @@ def received_hz(
 ) -> dict[str, float]:
     """By kind, messages that an agent hears a second: of all others, but not for onlookers."""
     return {
-        kind: n * (1.0 - by_uav / n_uav) / watched_s
+        kind: n * (1.0 / n_uav if kind == TO_SOME else 1.0 - by_uav / n_uav) / watched_s
         for (by_uav, kind), n in said.items()
         if kind not in _FOR_ONLOOKERS
     }
 
 
+TO_SOME = "claim to some"
+"""Claims that are said to one UAV alone, each of which is one message."""
 _FOR_ONLOOKERS = frozenset({NAMES[Status], NAMES[Choice]})
+
+
+@contextlib.asynccontextmanager
+async def _addressed(run: Run) -> AsyncIterator[Inbox]:
+    """Where all arrives that UAVs claim and say to one of them alone."""
+    bus = await open_zenoh_bus(run.launch.layout.observer_seat(), inbox_capacity=1 << 18)
+    try:
+        bus.subscribe(KeySpace(run.launch.mission.name).claim_to("*", "*"))
+        yield bus.inbox
+    finally:
+        bus.close()
 
 
 async def _happens(run: Run, condition: Callable[[], bool], limit_s: float, what: str) -> bool:

@@ -20,6 +20,7 @@ from sim.bench.machine import share_bytes, this_machine
 from sim.bench.plan_report import write_figure
 from sim.bench.scale import (
     AGENTS,
+    TO_SOME,
     MessageCount,
     ScaleBench,
     ScaleRun,
@@ -33,7 +34,7 @@ from swarm.cli import main
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import MessageReceived, Tick
 from swarm.protocol.messages import Body
-from swarm.protocol.uav_messages import ClaimPhase
+from swarm.protocol.uav_messages import ClaimedWay, ClaimPhase
 from tests.support.builders import (
     IDLE,
     TIMING,
@@ -128,10 +129,33 @@ def test_claims_that_are_only_repeated_are_told_apart() -> None:
     state = MissionState(mission([uav("u0"), uav("u1")], [task("t0", 1.0)]), TIMING)
     core = count.around(state, state)
     core.start(0.0)
+    later = replace(IDLE, decided_s=1.0)
     for writer, number in (("u0", 1), ("u1", 1), ("u0", 1), ("u0", 2), ("u0", 1)):
-        core.step(MessageReceived(message(writer, IDLE, number)), 0.0)
+        claim = later if number == 2 else IDLE
+        core.step(MessageReceived(message(writer, claim, number)), 0.0)
 
     assert (count.new_claims, count.heard[True, "claim"]) == (3, 5)
+
+
+def test_a_claim_that_only_tells_of_grants_is_nothing_new_to_all() -> None:
+    count = MessageCount()
+    state = MissionState(mission([uav("u0"), uav("u1")], [task("t0", 1.0)]), TIMING)
+    core = count.around(state, state)
+    core.start(0.0)
+    way = ClaimedWay(1, ((0.0, 0.0, 30.0),), flies=True)
+    hovers, grants = replace(IDLE, way=way), replace(IDLE, way=replace(way, grants={"u1": 3}))
+    asks = replace(grants, way=ClaimedWay(2, ((0.0, 0.0, 30.0), (9.0, 0.0, 30.0))))
+    for number, claim in enumerate((hovers, grants, asks), 1):
+        core.step(MessageReceived(message("u0", claim, number)), 0.0)
+
+    assert (count.new_claims, count.heard[True, "claim"]) == (2, 3)
+
+
+def test_what_is_said_to_one_alone_is_heard_by_one() -> None:
+    said = Counter({(True, "claim"): 40, (True, TO_SOME): 40})
+
+    assert published_hz(said, 4, 10.0) == {"claim": 1.0, TO_SOME: 1.0}
+    assert received_hz(said, 4, 10.0) == {"claim": 3.0, TO_SOME: 1.0}
 
 
 def test_decisions_are_timed_by_what_agents_log() -> None:
