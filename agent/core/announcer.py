@@ -89,8 +89,10 @@ class Announcer:
 
     def say_to(self, claim: Claim, to: Iterable[str]) -> Publish:
         """State the own claim to those alone, if any; others hear it when it is said next."""
-        message = self._register_writer.say(claim)
-        self._replica.join(message)
+        message = self.claimed
+        if message is None or message.body != claim:  # else it is said once more
+            message = self._register_writer.say(claim)
+            self._replica.join(message)
         return Publish(message, tuple(to))
 
     def stretch(self, stretch: float) -> None:
