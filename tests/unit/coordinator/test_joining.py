@@ -32,7 +32,7 @@ def test_an_onlooker_tells_what_it_knows_when_it_asks_again() -> None:
 
         def asked(times: int) -> bool:
             queries = [each for each in fleet.inbox.take() if isinstance(each, Query)]
-            told.extend(decode_digest(each.payload) for each in queries)
+            told.extend(decode_digest(each.payload) or {} for each in queries)
             for each in queries:
                 each.reply(b"")
             return len(told) >= times
