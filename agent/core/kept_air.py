@@ -27,6 +27,8 @@ class KeptAir:
         self.tell_again_at_s: float | None = None
         """When it is to look whether somebody has not heard what it was granted."""
         self._grants: dict[str, int] = {}
+        self._looked_at: dict[str, int] = {}
+        """What it had granted when it looked last, in this life."""
         self._seats: tuple[int, ...] = ()
         """Those that it has taken over."""
         self._sits = True
@@ -67,12 +69,12 @@ class KeptAir:
             expired: who is not in the air any more, whatever it said.
             now_s: now [s].
         """
-        before = self._grants
         self._seats = air.inherited(self._uav, claims(), heard, expired)
         self._grants = air.granted(self._uav, claims(), heard, expired)
         self._sits = bool(air.stacks_of(self._uav, claims(), expired))
-        if not self._grants.items() <= before.items():
+        if not self._grants.items() <= self._looked_at.items():
             self.tell_again_at_s = now_s + self._again_s
+        self._looked_at = self._grants
 
     def told_to(
         self,

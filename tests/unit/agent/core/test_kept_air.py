@@ -67,6 +67,15 @@ def test_who_still_asks_for_what_it_was_granted_is_told_again_and_again() -> Non
     assert keeper.look(14.0) == ["u3"]
 
 
+def test_a_later_life_tells_once_more_what_an_earlier_one_may_not_have_told() -> None:
+    keeper = Keeper()
+    keeper.said = replace(OWN, grants={"u3": 5})
+    keeper.kept.recall(keeper.said)
+
+    assert keeper.look(10.0) is None
+    assert keeper.look(12.0) == ["u3"]
+
+
 def test_who_flies_or_asks_for_something_else_is_told_no_more() -> None:
     for now in (replace(ASKS, flies=True), replace(ASKS, number=6, path_enu_m=ASKS.path_enu_m[:1])):
         keeper = Keeper()
