@@ -6,7 +6,7 @@ Leaves out: asking, granting and setting off (agent.core.airway).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from types import MappingProxyType
@@ -360,9 +360,7 @@ class FleetAir:
         path = way.path_enu_m
         asking = air.in_the_way(self._uav, np.array(path), claims, self.expired())
         left = path if place is None else not_flown(path, place)
-        wanted = (air.wanted(uav, air.way(uav, claims)) for uav in asking)
-        helps = any(apart(air.slabs, np.array(left), each) for each in wanted)
-        return bool(asking), left if helps else None
+        return bool(asking), left if _helps(air, asking, left, claims) else None
 
     def can_wait(
         self, air: SharedAir, now: Claim, said: Claim, claims: Mapping[str, Claim]
@@ -386,9 +384,7 @@ class FleetAir:
         if len(way.path_enu_m) == len(known.path_enu_m):
             return True
         asking = air.in_the_way(self._uav, np.array(known.path_enu_m), claims, self.expired())
-        wanted = (air.wanted(uav, air.way(uav, claims)) for uav in asking)
-        left = np.array(way.path_enu_m)
-        return not any(apart(air.slabs, left, each) for each in wanted)
+        return not _helps(air, asking, way.path_enu_m, claims)
 
     def claims_with(self, own: Claim) -> Mapping[str, Claim]:
         """Claims of everyone, the ``own`` one that: the same object as long as none changes."""
@@ -428,3 +424,11 @@ class FleetAir:
     def mission_s(self) -> float:
         """Mission time of the step that is under way [s]."""
         return self._mission_view.mission_s(self._mission_view.now_s)
+
+
+def _helps(
+    air: SharedAir, asking: Iterable[str], left: Sequence[Point], claims: Mapping[str, Claim]
+) -> bool:
+    """Whether any of those who ask would meet nothing of what is ``left`` [m] of a way."""
+    wanted = (air.wanted(uav, air.way(uav, claims)) for uav in asking)
+    return any(apart(air.slabs, np.array(left), each) for each in wanted)
