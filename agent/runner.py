@@ -1,10 +1,10 @@
 """The agent's process: its core between a bus and a vehicle.
 
-Publishes ``uav/<id>/claim``, ``…/outcome/<task>``, ``…/status`` and ``…/choice``, to some alone
-``uav/<id>/claim/<name>``, holds
-``alive/<id>`` and answers on ``state/<id>``; subscribes to ``brief``, ``plan``,
-``board/*``, ``uav/*/claim``, ``uav/*/claim/<id>``, ``uav/*/outcome/*`` and ``operator/*`` and
-watches ``alive/*``. Leaves out: every decision (agent.core.agent_core) and flying (agent.vehicle).
+Publishes ``uav/<id>/claim``, for some alone ``…/claim/<name>``, ``…/outcome/<task>``,
+``…/status`` and ``…/choice``, holds ``alive/<id>`` and answers on ``state/<id>``; subscribes to
+``brief``, ``plan``, ``board/*``, ``uav/*/claim``, ``uav/*/claim/<id>``, ``uav/*/outcome/*`` and
+``operator/*`` and watches ``alive/*``. Leaves out: every decision (agent.core.agent_core) and
+flying (agent.vehicle).
 """
 
 from __future__ import annotations

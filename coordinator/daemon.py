@@ -3,9 +3,9 @@
 Publishes ``brief``, ``plan`` and ``board/<task>``, holds ``alive/coordinator`` and answers on
 ``state/coordinator``; while it stands by, none of that. Subscribes to ``brief``, ``plan``,
 ``board/*``, ``uav/*/claim``, ``uav/*/claim/coordinator``, ``uav/*/outcome/*`` and ``operator/*``
-and watches ``alive/*``. One
-that stands by takes a seat as an observer; when it takes over it keeps that seat. When it has to
-stand down, it leaves it and watches from a new one: a token cannot be taken back.
+and watches ``alive/*``. One that stands by takes a seat as an observer; when it takes over it keeps
+that seat. When it has to stand down, it leaves it and watches from a new one: a token cannot be
+taken back.
 """
 
 from __future__ import annotations
@@ -124,6 +124,7 @@ async def run_coordinator(
     ):  # agents of earlier releases cannot read it, which shows there alone
         bus.subscribe(KeySpace(mission.name).status("*"), latest=True)
     shell.suit_fleet(len(mission.uavs))
+    # What keepers of air grant: it can tell one of them that has forgotten it. That is not urgent.
     granted = KeySpace(mission.name).claim_to("*", COORDINATOR)
     bus.subscribe(granted, gathered=len(mission.uavs) > UNSTRETCHED_UAVS)
     try:

@@ -17,6 +17,7 @@ _OF_A_START: Final = 200_000
 """More new things than a start makes. So much garbage is some 20 MB, and found in some 10 ms."""
 _USUAL: Final = gc.get_threshold()
 _SELDOM: Final = 100
+"""How many times as seldom the oldest things are looked through where they are `kept`."""
 
 
 def begin_start() -> None:

@@ -10,9 +10,10 @@ from agent.core.last_departure import LEAVES_ZONE_S
 from agent.core.states import AgentState
 from swarm.protocol.events import LinkChanged
 from swarm.protocol.messages import CommandKind
+from swarm.protocol.uav_messages import ClaimPhase
 from tests.support.builders import entry
 from tests.support.field_agent import FieldAgent, Script, square
-from tests.support.lone_agent import notes, orders
+from tests.support.lone_agent import claims, notes, orders
 from tests.support.shut_air import FAR_AWAY, SOON_S, Fleet
 
 ACROSS = ((30.0, -80.0, 10.0), (30.0, 80.0, 10.0))
@@ -216,3 +217,24 @@ def test_who_may_not_stop_is_told_again_where_it_has_come_to_and_not_at_once() -
     agent.happen(Arrived(STOP_LEG))
     agent.run_until(46.0)
     assert isinstance(agent.last_order, Return)
+
+
+def test_who_waits_for_its_way_holds_its_task_in_the_word_of_its_departure(script: Script) -> None:
+    fleet = Fleet(entry("t0", 100.0))
+    agent = fleet.agent
+    fleet.other_flies(*ACROSS)
+    script.items = ["t1"]
+    agent.post(entry("t1", 100.0))
+    assert (agent.task, agent.phase) == ("t1", ClaimPhase.PROPOSED)
+    agent.run_until(3.0)
+    assert claims(agent.log)[-1].phase is ClaimPhase.PROPOSED
+    before = len(claims(agent.log))
+
+    fleet.other_flies(*FAR_AWAY)
+    agent.run_until(3.0 + SOON_S)
+
+    assert agent.flight.task == "t1"
+    told = claims(agent.log)[before:]
+    departs = [claim for claim in told if claim.way is not None and claim.way.flies]
+    assert {claim.phase for claim in departs} == {ClaimPhase.HELD}
+    assert agent.phase is ClaimPhase.HELD

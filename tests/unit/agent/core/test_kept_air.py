@@ -28,13 +28,13 @@ def claim(way: ClaimedWay) -> Claim:
 class Keeper:
     """``u0``, and what it knows of the others."""
 
-    def __init__(self) -> None:
+    def __init__(self, own: ClaimedWay = OWN) -> None:
         self.kept = KeptAir("u0", AGAIN_S)
-        self.said = OWN
+        self.own = self.said = own
         self.others = {"u3": claim(ASKS)}
 
     def claims(self) -> dict[str, Claim]:
-        return {**self.others, "u0": claim(self.kept.told(OWN))}
+        return {**self.others, "u0": claim(self.kept.told(self.own))}
 
     def look(self, now_s: float) -> list[str] | None:
         """Whom it tells what it has granted, having looked; None: there is nothing to say."""
@@ -97,11 +97,8 @@ def test_what_it_has_granted_is_not_said_of_a_way_that_it_has_not_told_of() -> N
 
 
 def test_its_own_request_is_told_to_those_who_could_tell_it_after_a_restart() -> None:
-    keeper = Keeper()
+    keeper = Keeper(ClaimedWay(3, ((0.0, 0.0, 30.0), (0.0, 50.0, 30.0))))
     keeper.others.clear()
-    asks = ClaimedWay(3, ((0.0, 0.0, 30.0), (0.0, 50.0, 30.0)))
-    keeper.claims = lambda: {"u0": claim(keeper.kept.told(asks))}  # type: ignore[method-assign]  # another way of its own
-    keeper.said = asks
 
     told = keeper.look(10.0)
 
