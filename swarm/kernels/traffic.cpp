@@ -132,9 +132,16 @@ struct Track {
     double age_s(double now_s) const { return std::max(0.0, now_s - said_s); }
 
     Cylinder halts(const Rules& rules, double now_s) const {
-        const double age = age_s(now_s);
-        const double drive = std::min(age, rules.forget_s) + rules.reaction_s + rules.tick_s;
-        return flown.reach(rules, drive, true).grown(stray(rules, age));
+        return flown.reach(rules, drive_s(rules, now_s), true).grown(stray(rules, age_s(now_s)));
+    }
+
+    std::vector<double> stops(const Rules& rules, double now_s) const {
+        return flown.stops(rules, drive_s(rules, now_s));
+    }
+
+    // How long it may have flown on as it said before it brakes.
+    double drive_s(const Rules& rules, double now_s) const {
+        return std::min(age_s(now_s), rules.forget_s) + rules.reaction_s + rules.tick_s;
     }
 
     Stray stray(const Rules& rules, double age) const {
@@ -221,9 +228,10 @@ public:
                                     std::vector<Vector> path, double speed, double now_s,
                                     bool gives_way) const {
         const Flown own = checked(place, velocity, std::move(path), speed);
-        const double age_s = rules_.beacon_s + rules_.tick_s;
-        const Cylinder mine = own.reach(rules_, age_s + rules_.reaction_s, true)
-                                  .grown(stray_after(age_s, own.told_m_s, rules_));
+        const double then_s = now_s + rules_.beacon_s;
+        const Track me{own, now_s - rules_.tick_s, {}, false, 0.0};
+        const Cylinder mine = me.halts(rules_, then_s);
+        std::vector<double> stops;
         bool close = false;
         for (const auto& [number, track] : tracks_) {
             const double age = now_s - track.said_s;
@@ -231,8 +239,7 @@ public:
             if (!is_near(track, place, age)) continue;
             if (age > rules_.silent_s) return {close, true};
             if (close || !(gives_way || track.precedence[0] != 0)) continue;
-            const Cylinder theirs = track.halts(rules_, now_s + rules_.beacon_s);
-            close = mine.distance_m(theirs) < rules_.apart_m + rules_.wide_m;
+            close = may_brake(track, me, mine, stops, then_s);
         }
         return {close, false};
     }
@@ -284,10 +291,8 @@ private:
         const double asked_m = rules_.separation_m + rules_.grid_m + kRoundingM;
         if (halt.distance_m(track.halts(rules_, now_s)) >= asked_m) return false;
         if (stop.empty()) stop = own.stops(rules_, drive_s);
-        const double age = track.age_s(now_s);
-        const std::vector<double> theirs = track.flown.stops(
-            rules_, std::min(age, rules_.forget_s) + rules_.reaction_s + rules_.tick_s);
-        const Stray stray = track.stray(rules_, age);
+        const std::vector<double> theirs = track.stops(rules_, now_s);
+        const Stray stray = track.stray(rules_, track.age_s(now_s));
         const auto least = [&](std::size_t count, const Stray& by) {
             return std::sqrt(least_squared(stop.data(), count, theirs.data(), theirs.size() / 3,
                                            by.flat_m, by.upright_m));
@@ -296,6 +301,21 @@ private:
         if (least(all, stray) >= asked_m) return false;
         if (least(1, stray) >= asked_m - 2.0 * kRoundingM) return true;
         return least(all, {0.0, 0.0}) < least(1, {0.0, 0.0}) - rules_.grid_m + kRoundingM;
+    }
+
+    // Either of two before the other, who may have turned while it flew on as it said.
+    bool may_brake(const Track& track, const Track& me, const Cylinder& mine,
+                   std::vector<double>& stops, double then_s) const {
+        const double asked_m = rules_.separation_m + rules_.grid_m + rules_.wide_m;
+        if (mine.distance_m(track.halts(rules_, then_s)) >= asked_m) return false;
+        if (stops.empty()) stops = me.stops(rules_, then_s);
+        const std::vector<double> theirs = track.stops(rules_, then_s);
+        const auto is_barred_by = [&](const Track& turned) {
+            const Stray by = turned.stray(rules_, turned.age_s(then_s));
+            return std::sqrt(least_squared(stops.data(), stops.size() / 3, theirs.data(),
+                                           theirs.size() / 3, by.flat_m, by.upright_m)) < asked_m;
+        };
+        return is_barred_by(me) || is_barred_by(track);
     }
 
     Rules rules_;

@@ -20,12 +20,12 @@ from swarm.separation.tactical_advice import Advice, Maneuver, OwnFlight
 from swarm.separation.tactical_look import Other, pace_s
 from swarm.separation.tactical_motion import (
     GRID_M,
-    STEP_S,
     Place,
     least_meeting_m,
     motion_m,
     round_m,
     stop_place_m,
+    stopping_m,
 )
 from swarm.separation.tactical_reach import reach
 from swarm.separation.tactical_traffic import (
@@ -385,9 +385,7 @@ class TacticalResolver:
         near = [other for other in others if mine.distance_m(other.halts) < asked_m]
         if not near:
             return None
-        fast_m_s = max(option.speed_m_s, math.hypot(*own.velocity_enu_m_s))
-        span_s = drive_s + fast_m_s / rules.agility.acceleration_m_s2 + STEP_S
-        way_m = motion_m(*flown, rules.agility, drive_s, span_s)
+        way_m = stopping_m(*flown, rules.agility, drive_s)
         for other in near:
             stops_m, stray = other.stops_m
             if least_distance_m(way_m, stops_m, stray) >= asked_m:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from functools import cached_property
 
-from swarm.kernels.motions import FloatArray
-from swarm.separation.tactical_motion import stray_m
-from swarm.separation.tactical_reach import Cylinder, reach
+from swarm.kernels.motions import FloatArray, least_distance_m
+from swarm.separation.tactical_motion import GRID_M
+from swarm.separation.tactical_reach import Cylinder
 from swarm.separation.tactical_traffic import (
     WIDE_M,
     Grade,
@@ -63,8 +62,9 @@ def pace_s(
 ) -> float:
     """How long the next decision and the next word can wait after the last one [s].
 
-    A tick where a second more or less could make somebody brake: if one of two flew on for so much
-    longer, and was not heard for so much longer. Of two that can't give way neither brakes.
+    A tick where a second more or less could make somebody brake: one of two that flies on as it
+    said, for all that the other may do while it is not heard for a second more. Of two that can't
+    give way neither brakes.
 
     Args:
         word: of the own flight.
@@ -76,16 +76,18 @@ def pace_s(
     is_close = picture.is_close(word, now_s, gives_way=gives_way)
     if is_close is not None:
         return rules.tick_s if is_close else rules.beacon_s
-    age_s = rules.beacon_s + rules.tick_s
-    mine = reach(
-        *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s),
-        rules.agility,
-        age_s + rules.reaction_s,
-        brakes=True,
-    ).grown(stray_m(age_s, math.hypot(*word.velocity_enu_m_s), rules.agility))
-    for _, track in picture.near(word.position_enu_m, now_s):
-        if gives_way or track.word.precedence.grade is not Grade.BOUND:
-            theirs = track.reach_of_stops(now_s, rules, later_s=rules.beacon_s)
-            if mine.distance_m(theirs) < rules.apart_m + WIDE_M:
-                return rules.tick_s
+    asked_m, later_s = rules.separation_m + GRID_M + WIDE_M, rules.beacon_s
+    me = NearbyTrack(word, now_s, rules.tick_s)
+    mine = me.reach_of_stops(now_s, rules, later_s)
+    near = [
+        track
+        for _, track in picture.near(word.position_enu_m, now_s)
+        if (gives_way or track.word.precedence.grade is not Grade.BOUND)
+        and mine.distance_m(track.reach_of_stops(now_s, rules, later_s)) < asked_m
+    ]
+    my_stops_m, my_stray_m = me.stops_m(now_s, rules, later_s)
+    for track in near:
+        stops_m, stray_m = track.stops_m(now_s, rules, later_s)
+        if any(least_distance_m(my_stops_m, stops_m, by) < asked_m for by in (my_stray_m, stray_m)):
+            return rules.tick_s
     return rules.beacon_s

@@ -81,6 +81,20 @@ def motion_m(
     return sampled_motion(*flown, fast_m_s2, climb_m_s, drive_s, STEP_S, steps)
 
 
+def stopping_m(
+    position_m: Place,
+    velocity_m_s: Place,
+    path_m: Sequence[Place],
+    speed_m_s: float,
+    agility: Agility,
+    drive_s: float,
+) -> FloatArray:
+    """Places as of `motion_m` of a UAV that brakes after ``drive_s``, until it stands."""
+    fast_m_s = max(speed_m_s, math.hypot(*velocity_m_s))
+    span_s = drive_s + fast_m_s / agility.acceleration_m_s2 + STEP_S
+    return motion_m(position_m, velocity_m_s, path_m, speed_m_s, agility, drive_s, span_s)
+
+
 def stop_place_m(
     position_m: Place, velocity_m_s: Place, reaction_s: float, agility: Agility
 ) -> Place:

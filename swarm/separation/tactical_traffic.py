@@ -23,6 +23,7 @@ from swarm.separation.tactical_motion import (
     Place,
     column_m,
     motion_m,
+    stopping_m,
     stray_m,
 )
 from swarm.separation.tactical_reach import SLACK_M, Cylinder, reach
@@ -289,26 +290,26 @@ class NearbyTrack:
         here_m, end_m = self.word.position_enu_m[2], self.word.path_enu_m[-1][2]
         return min(max(end_m, here_m - _MOST_COLUMN_M), here_m + _MOST_COLUMN_M)
 
-    def stops_m(self, now_s: float, rules: TrafficRules) -> tuple[FloatArray, tuple[float, float]]:
+    def stops_m(
+        self, now_s: float, rules: TrafficRules, later_s: float = 0.0
+    ) -> tuple[FloatArray, tuple[float, float]]:
         """Where it may be before it has stopped, however it decides until it hears more.
+
+        Args:
+            now_s: now, on the own clock.
+            rules: of the fleet.
+            later_s: with the same word so much later.
 
         Returns:
             Places along the way that it told, and how far from these it may be, see `stray_m`.
         """
-        age_s, word = max(0.0, now_s - self.said_s), self.word
-        fast_m_s = max(word.speed_m_s, math.hypot(*word.velocity_enu_m_s))
-        drive_s = _drive_s(age_s, rules)
-        way_m = motion_m(
-            *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m),
-            word.speed_m_s,
-            rules.agility,
-            drive_s,
-            drive_s + fast_m_s / rules.agility.acceleration_m_s2 + STEP_S,
-        )
+        age_s, word = max(0.0, now_s + later_s - self.said_s), self.word
+        flown = word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s
+        way_m = stopping_m(*flown, rules.agility, _drive_s(age_s, rules))
         return way_m, self._stray_m(age_s, rules)
 
     def reach_of_stops(self, now_s: float, rules: TrafficRules, later_s: float = 0.0) -> Cylinder:
-        """Holds all of `stops_m`, with what it may stray; with the same word so much later."""
+        """Holds all of `stops_m`, with what it may stray."""
         age_s, word = max(0.0, now_s + later_s - self.said_s), self.word
         return reach(
             *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s),

@@ -52,8 +52,8 @@ def test_who_is_alone_or_far_away_takes_its_time() -> None:
 
 
 def test_who_may_soon_have_to_brake_does_not() -> None:
-    assert pace_of(own_of("a"), standing_word(at(-20, 0))) == RULES.tick_s
-    assert pace_of(hovering(at(0, 0)), standing_word(at(14, 0))) == RULES.tick_s
+    assert pace_of(own_of("a"), standing_word(at(-25, 0))) == RULES.tick_s
+    assert pace_of(hovering(at(0, 0)), standing_word(at(13, 0))) == RULES.tick_s
 
 
 def test_who_has_just_begun_speaks_often_as_it_may_not_have_been_heard() -> None:

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 from swarm.separation.tactical import TacticalResolver
 from swarm.separation.tactical_advice import Maneuver, OwnFlight
+from swarm.separation.tactical_look import pace_s
 from swarm.separation.tactical_motion import Place
 from swarm.separation.tactical_traffic import (
     Grade,
@@ -70,6 +71,49 @@ def test_whatever_is_heard_it_decides_as_if_it_had_looked_at_each(
 def on_way(place: Place, velocity: Place, after_s: float) -> Place:
     (east, north, up), (east_m_s, north_m_s, up_m_s) = place, velocity
     return east + after_s * east_m_s, north + after_s * north_m_s, up + after_s * up_m_s
+
+
+def flown_on(flight: OwnFlight, after_s: float) -> OwnFlight:
+    return replace(
+        flight, position_enu_m=on_way(flight.position_enu_m, flight.velocity_enu_m_s, after_s)
+    )
+
+
+def word_of(flight: OwnFlight) -> TrafficWord:
+    return TacticalResolver("", RULES).word(flight)
+
+
+def brakes(own: OwnFlight, other: OwnFlight, age_s: float) -> bool:
+    """Whether it brakes before one that it heard so long ago and that has nothing to tell it."""
+    picture = TrafficPicture(RULES, 225.0)
+    last = replace(word_of(other), precedence=Precedence(Grade.FREE, 9))
+    picture.hear("u9", last, 0.0, age_s)
+    return TacticalResolver("u0", RULES).decide(own, picture, 0.0).braked
+
+
+def somewhere(rng: np.random.Generator) -> OwnFlight:
+    """One that flies straight on, in one of three layers."""
+    place = (*rng.uniform(-40.0, 40.0, 2).tolist(), float(rng.choice([30.0, 38.0, 46.0])))
+    speed, turn = rng.uniform(0.0, 8.0), rng.uniform(0.0, 2.0 * math.pi)
+    velocity = speed * math.cos(turn), speed * math.sin(turn), 0.0
+    way = (on_way(place, velocity, 60.0),)
+    return OwnFlight(place, velocity, way, speed, Precedence(Grade.FLYING, 1))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_while_one_takes_its_time_neither_has_to_brake(seed: int) -> None:
+    """Both fly on as they said, and are not heard meanwhile."""
+    rng, takes_time = np.random.default_rng(seed), 0
+    for _ in range(400):
+        own, other = somewhere(rng), somewhere(rng)
+        age_s, later_s = rng.uniform(0.0, RULES.tick_s), RULES.beacon_s * rng.uniform(0.5, 1.0)
+        picture = TrafficPicture(RULES, 225.0)
+        picture.hear("u9", word_of(other), 0.0, age_s)
+        if pace_s(word_of(own), picture, RULES, 0.0, gives_way=True) == RULES.beacon_s:
+            takes_time += 1
+            assert not brakes(flown_on(own, later_s), other, age_s + later_s)
+            assert not brakes(flown_on(other, age_s + later_s), own, age_s + later_s)
+    assert 300 < takes_time < 390
 
 
 def crossing(seed: int) -> list[tuple[Place, Place, float]]:
