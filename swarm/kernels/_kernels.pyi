@@ -126,6 +126,7 @@ class TrafficTable:
         path_m: Sequence[Sequence[float]],
         speed_m_s: float,
         now_s: float,
+        wait_s: float,
         gives_way: bool,
     ) -> tuple[bool, bool]: ...
 

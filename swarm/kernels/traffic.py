@@ -28,7 +28,6 @@ class TrafficNumbers:
     climb_m_s: float
     reaction_s: float
     tick_s: float
-    beacon_s: float
     horizon_s: float
     step_s: float
     silent_s: float
@@ -93,8 +92,10 @@ class TrafficTable:
         path_m: Sequence[Vector],
         speed_m_s: float,
         now_s: float,
+        wait_s: float,
         *,
         gives_way: bool,
     ) -> tuple[bool, bool]:
-        """Whether anybody is close, and whether the first is not known, as of `look`."""
-        return self._table.is_close(place_m, velocity_m_s, path_m, speed_m_s, now_s, gives_way)
+        """Whether anybody is close for so long, and whether that is not known, as of `look`."""
+        flown = place_m, velocity_m_s, path_m, speed_m_s
+        return self._table.is_close(*flown, now_s, wait_s, gives_way)

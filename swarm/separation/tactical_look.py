@@ -62,9 +62,7 @@ def pace_s(
 ) -> float:
     """How long the next decision and the next word can wait after the last one [s].
 
-    A tick where a second more or less could make somebody brake: one of two that flies on as it
-    said, for all that the other may do while it is not heard for a second more. Of two that can't
-    give way neither brakes.
+    A second, or half of it, unless somebody is close for so long, see `is_close`; else a tick.
 
     Args:
         word: of the own flight.
@@ -73,21 +71,49 @@ def pace_s(
         now_s: now, on the own clock.
         gives_way: whether it may be told otherwise than to fly on.
     """
-    is_close = picture.is_close(word, now_s, gives_way=gives_way)
-    if is_close is not None:
-        return rules.tick_s if is_close else rules.beacon_s
-    asked_m, later_s = rules.separation_m + GRID_M + WIDE_M, rules.beacon_s
+    for wait_s in (rules.beacon_s, rules.beacon_s / 2.0):
+        close = picture.is_close(word, now_s, wait_s, gives_way=gives_way)
+        if close is None:
+            close = is_close(word, picture, rules, now_s, wait_s, gives_way=gives_way)
+        if not close:
+            return wait_s
+    return rules.tick_s
+
+
+def is_close(
+    word: TrafficWord,
+    picture: TrafficPicture,
+    rules: TrafficRules,
+    now_s: float,
+    wait_s: float,
+    *,
+    gives_way: bool,
+) -> bool:
+    """Whether it could make somebody brake to wait for so long.
+
+    One of two that flies on as it said, for all that the other may do while it is not heard for so
+    much longer. Of two that can't give way neither brakes.
+
+    Args:
+        word: of the own flight.
+        picture: those near it.
+        rules: of the fleet.
+        now_s: now, on the own clock.
+        wait_s: until the next decision and the next word.
+        gives_way: whether it may be told otherwise than to fly on.
+    """
+    asked_m = rules.separation_m + GRID_M + WIDE_M
     me = NearbyTrack(word, now_s, rules.tick_s)
-    mine = me.reach_of_stops(now_s, rules, later_s)
+    mine = me.reach_of_stops(now_s, rules, wait_s)
     near = [
         track
         for _, track in picture.near(word.position_enu_m, now_s)
         if (gives_way or track.word.precedence.grade is not Grade.BOUND)
-        and mine.distance_m(track.reach_of_stops(now_s, rules, later_s)) < asked_m
+        and mine.distance_m(track.reach_of_stops(now_s, rules, wait_s)) < asked_m
     ]
-    my_stops_m, my_stray_m = me.stops_m(now_s, rules, later_s)
+    my_stops_m, my_stray_m = me.stops_m(now_s, rules, wait_s)
     for track in near:
-        stops_m, stray_m = track.stops_m(now_s, rules, later_s)
+        stops_m, stray_m = track.stops_m(now_s, rules, wait_s)
         if any(least_distance_m(my_stops_m, stops_m, by) < asked_m for by in (my_stray_m, stray_m)):
-            return rules.tick_s
-    return rules.beacon_s
+            return True
+    return False

@@ -408,20 +408,23 @@ class TrafficPicture:
         anybody, odd, in_way = self._table.look(*flown, now_s, precedence.numbers)
         return None if odd or in_way else anybody
 
-    def is_close(self, word: TrafficWord, now_s: float, *, gives_way: bool) -> bool | None:
-        """Whether anybody is close, see `swarm.separation.tactical_look.pace_s`.
+    def is_close(
+        self, word: TrafficWord, now_s: float, wait_s: float, *, gives_way: bool
+    ) -> bool | None:
+        """Whether anybody is close for so long, see `swarm.separation.tactical_look.is_close`.
 
         None: somebody has to be looked at for that.
 
         Args:
             word: of the own flight.
             now_s: now, on the own clock.
+            wait_s: until the next decision and the next word.
             gives_way: whether it may be told otherwise than to fly on.
         """
         if now_s < self._doubts_until_s:
             return None
         flown = word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s
-        is_close, odd = self._table.is_close(*flown, now_s, gives_way=gives_way)
+        is_close, odd = self._table.is_close(*flown, now_s, wait_s, gives_way=gives_way)
         return None if odd else is_close
 
     def place_of(self, uav: str) -> Place | None:
@@ -481,7 +484,6 @@ def _numbers_of(rules: TrafficRules) -> TrafficNumbers:
         climb_m_s=rules.agility.climb_m_s,
         reaction_s=rules.reaction_s,
         tick_s=rules.tick_s,
-        beacon_s=rules.beacon_s,
         horizon_s=rules.horizon_s,
         step_s=STEP_S,
         silent_s=SILENT_S,

@@ -52,8 +52,10 @@ def test_who_is_alone_or_far_away_takes_its_time() -> None:
 
 
 def test_who_may_soon_have_to_brake_does_not() -> None:
-    assert pace_of(own_of("a"), standing_word(at(-25, 0))) == RULES.tick_s
-    assert pace_of(hovering(at(0, 0)), standing_word(at(13, 0))) == RULES.tick_s
+    assert pace_of(own_of("a"), standing_word(at(-25, 0))) == RULES.beacon_s / 2.0
+    assert pace_of(hovering(at(0, 0)), standing_word(at(13, 0))) == RULES.beacon_s / 2.0
+    assert pace_of(own_of("a"), standing_word(at(-35, 0))) == RULES.tick_s
+    assert pace_of(hovering(at(0, 0)), standing_word(at(11.5, 0))) == RULES.tick_s
 
 
 def test_who_has_just_begun_speaks_often_as_it_may_not_have_been_heard() -> None:
@@ -65,7 +67,7 @@ def test_of_two_that_can_not_give_way_neither_has_to_hear_often() -> None:
     climbs = hovering(at(0, 0), Grade.BOUND)
 
     assert pace_of(climbs, standing_word(at(12, 0), Grade.BOUND)) == RULES.beacon_s
-    assert pace_of(climbs, standing_word(at(12, 0), Grade.FREE)) == RULES.tick_s
+    assert pace_of(climbs, standing_word(at(12, 0), Grade.FREE)) == RULES.beacon_s / 2.0
 
 
 def test_who_was_not_known_to_be_near_or_silent_is_news() -> None:

@@ -106,10 +106,11 @@ def test_while_one_takes_its_time_neither_has_to_brake(seed: int) -> None:
     rng, takes_time = np.random.default_rng(seed), 0
     for _ in range(400):
         own, other = somewhere(rng), somewhere(rng)
-        age_s, later_s = rng.uniform(0.0, RULES.tick_s), RULES.beacon_s * rng.uniform(0.5, 1.0)
+        age_s, share = rng.uniform(0.0, RULES.tick_s), rng.uniform(0.5, 1.0)
         picture = TrafficPicture(RULES, 225.0)
         picture.hear("u9", word_of(other), 0.0, age_s)
-        if pace_s(word_of(own), picture, RULES, 0.0, gives_way=True) == RULES.beacon_s:
+        later_s = share * pace_s(word_of(own), picture, RULES, 0.0, gives_way=True)
+        if later_s > RULES.tick_s:
             takes_time += 1
             assert not brakes(flown_on(own, later_s), other, age_s + later_s)
             assert not brakes(flown_on(other, age_s + later_s), own, age_s + later_s)
