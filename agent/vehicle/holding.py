@@ -2,8 +2,8 @@
 
 Out of a mission, a return or a takeoff in a mode of its own, the guided mode stops the
 vehicle. In the guided mode the firmware's own pause does, which needs no place; where there
-is none, a target at the place where the vehicle is, if what it told before bears that out,
-or the nearest within the fence. All are told again until the effect is seen.
+is none, a target at the place where the vehicle can stop, if what it told before bears that
+out, or the nearest within the fence. All are told again until the effect is seen.
 """
 
 from __future__ import annotations
@@ -144,9 +144,12 @@ class Holding(Activity):
                 self._tell(self._stop, self._stop_message)
 
     def _stay(self) -> VehicleCommand | None:
-        """A target where the vehicle is; None while that is not known."""
+        """A target where the vehicle can stop: it comes back to one that is nearer.
+
+        None while it is not known where it is.
+        """
         session, config = self._session, self._session.config
-        place_enu_m = session.position_filter.place_m(session.now_s - config.stream_timeout_s)
+        place_enu_m = session.stops_at_m()
         if place_enu_m is not None:
             place = wgs84_from_enu(config.origin, config.within_fence(place_enu_m))
             return self._firmware.reposition(*place, session.cruise_speed_m_s)

@@ -293,7 +293,11 @@ class VehicleSession(Conversation):
         home_alt_m = 0.0 if position is None else position.alt_m - position.relative_alt_m
         free = self.mission is None or not self.mission.is_transferring
         home_up_m = home_alt_m - self.config.origin.alt_m
-        way_m = None if self.comes_back_into_zone else self._braking_way_m(_HEEDS_S)
+        way_m = (
+            None
+            if self.comes_back_into_zone
+            else self._braking_way_m(_HEEDS_S, self.acceleration_m_s2)
+        )
         fence.advance(way_m, home_up_m, may_begin=free)
         return fence.objection
 
@@ -310,23 +314,43 @@ class VehicleSession(Conversation):
 
     def slides_into_zone(self) -> bool:
         """Whether it is too fast to stop outside of zones."""
-        way_m, position = self._braking_way_m(0.0) if self.guard else None, self.vehicle.position
+        position = self.vehicle.position
+        way_m = self._braking_way_m(0.0, self.acceleration_m_s2) if self.guard else None
         if way_m is None or position is None:
             return False
         is_slow = math.hypot(*position.velocity_enu_m_s) <= self.config.arrival_speed_m_s
         return not is_slow and self.guard.objection(way_m) is not None
 
-    def _braking_way_m(self, heeds_s: float) -> tuple[Point, Point] | None:
+    def stops_at_m(self) -> Point | None:
+        """Where it can stop if it brakes now, at its cruise speed at the most [m]; None: not known.
+
+        Where it is, if it can't hover, if how it brakes is not known, or if a zone is in the way.
+        """
+        hovers = self.firmware is None or self.firmware.traits.stays
+        if self.set_m_s2 is None or not hovers:
+            return self.known_place_m()
+        way_m = self._braking_way_m(0.0, self.set_m_s2, self.cruise_speed_m_s)
+        if way_m is None:
+            return None
+        blocked = bool(self.guard) and self.guard.objection(way_m) is not None
+        return way_m[0] if blocked else way_m[1]
+
+    def _braking_way_m(
+        self, heeds_s: float, acceleration_m_s2: float, most_m_s: float = math.inf
+    ) -> tuple[Point, Point] | None:
         """From where the vehicle is to where it would stop if it began to brake so late.
 
-        A straight way [m; mission origin]; None: not known.
+        A straight way [m; mission origin], as of one that flies no faster than ``most_m_s``; None:
+        not known.
         """
         place_enu_m, position = self.known_place_m(), self.vehicle.position
         if place_enu_m is None or position is None:
             return None
         east_m_s, north_m_s, _ = position.velocity_enu_m_s
-        brakes_s = math.hypot(east_m_s, north_m_s) / self.acceleration_m_s2
-        lasts_s = heeds_s + min(brakes_s, _BRAKES_S) / 2.0
+        flown_m_s = math.hypot(east_m_s, north_m_s)
+        counted_m_s = min(flown_m_s, most_m_s)
+        lasts_s = heeds_s + min(counted_m_s / acceleration_m_s2, _BRAKES_S) / 2.0
+        lasts_s *= counted_m_s / flown_m_s if flown_m_s > 0.0 else 1.0
         east_m, north_m, up_m = place_enu_m
         return place_enu_m, (east_m + lasts_s * east_m_s, north_m + lasts_s * north_m_s, up_m)
 

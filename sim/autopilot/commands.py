@@ -230,12 +230,14 @@ class CommandExecutor:
         if needs_flag and not change_mode:
             return pilot.flavour.refusals.reposition_without_flag
         pause = pilot.flavour.pauses_anywhere and _is_nowhere(command)
-        target_enu_m = pilot.position_enu_m(now_s) if pause else self._place(command)
-        if target_enu_m is None:
+        target_enu_m = self._place(command)
+        if target_enu_m is None and not pause:
             return _DENIED
         if not pilot.takes_targets and not pilot.set_mode(behaviour.for_reposition, now_s):
             return pilot.flavour.refusals.not_now
-        if not (pause or pilot.fence.allows_target(target_enu_m)):
+        if target_enu_m is None:  # PX4 reckons where it can stop, and does not come back
+            target_enu_m = pilot.flight.stopped_enu_m(now_s)
+        elif not pilot.fence.allows_target(target_enu_m):
             pilot.narrator.tell(FirmwareEvent.TARGET_OUTSIDE_FENCE)
             return pilot.flavour.refusals.outside_fence
         own_speed = pilot.flavour.obeys_leg_speed and 0.0 < speed_m_s < math.inf

@@ -251,7 +251,7 @@ class FlightStateMachine:
         if self.drives:
             self._leave(MotionPhase.RETURNING, self.home_enu_m, self.cruise_m_s, now_s)
             return
-        east_m, north_m, up_m = self._stopped_enu_m(now_s)
+        east_m, north_m, up_m = self.stopped_enu_m(now_s)
         return_up_m = self.home_enu_m[2] + self._parameters.value_si(ParameterRole.RETURN_HEIGHT_M)
         target_enu_m = (east_m, north_m, max(up_m, return_up_m))
         self._leave(MotionPhase.CLIMBING, target_enu_m, self._speed(ParameterRole.CLIMB_M_S), now_s)
@@ -332,8 +332,13 @@ class FlightStateMachine:
             self.activity, self._is_high = MotionPhase.LANDING, False
             motion.glide(landing_enu_m[1], now_s)
 
+    def stopped_enu_m(self, now_s: float) -> Point:
+        """Brake; where the vehicle comes to a stop [m]."""
+        self.motion.stop(now_s)
+        return self.motion.target_enu_m
+
     def _lift(self, now_s: float) -> None:
-        east_m, north_m, _ = self._stopped_enu_m(now_s)
+        east_m, north_m, _ = self.stopped_enu_m(now_s)
         target_enu_m = (east_m, north_m, self._take_off_up_m)
         self._leave(
             MotionPhase.TAKING_OFF, target_enu_m, self._speed(ParameterRole.TAKE_OFF_M_S), now_s
@@ -344,7 +349,7 @@ class FlightStateMachine:
 
     def _land(self, now_s: float) -> None:
         """Descend, far from the ground perhaps faster than near it."""
-        east_m, north_m, up_m = self._stopped_enu_m(now_s)
+        east_m, north_m, up_m = self.stopped_enu_m(now_s)
         low_up_m = self.ground_up_m(east_m, north_m) + _NEAR_GROUND_M
         self._is_high = self._descent_m_s is not None and up_m > low_up_m
         if self._descent_m_s is not None and self._is_high:
@@ -354,7 +359,7 @@ class FlightStateMachine:
             self._descend(MotionPhase.LANDING, self._speed(ParameterRole.LAND_M_S), now_s)
 
     def _descend(self, activity: MotionPhase, speed_m_s: float, now_s: float) -> None:
-        east_m, north_m, _ = self._stopped_enu_m(now_s)
+        east_m, north_m, _ = self.stopped_enu_m(now_s)
         target_enu_m = east_m, north_m, self.ground_up_m(east_m, north_m)
         self._leave(activity, target_enu_m, speed_m_s, now_s)
 
@@ -388,8 +393,3 @@ class FlightStateMachine:
             return set_m_s2
         ramps_s = speed_m_s / set_m_s2 + self._jerk_cost_s(speed_m_s, set_m_s2, jerk_m_s3)
         return speed_m_s / ramps_s
-
-    def _stopped_enu_m(self, now_s: float) -> Point:
-        """Where the vehicle comes to a stop if it brakes now [m]."""
-        self.motion.stop(now_s)
-        return self.motion.target_enu_m

@@ -394,10 +394,15 @@ class BridgeWatch:
         hold(ordered, f"sent to {place_m}, not to {places_m[-3:]}")
 
     def _is_borne_out(self, place_m: Point) -> bool:
-        """Whether the vehicle told it is there, and another place from which it can have come."""
-        told_m = self._task.told_m
+        """Whether the vehicle told it is there, or so near that it stops there by itself.
+
+        And another place from which it can have come.
+        """
+        told_m, session = self._task.told_m, self.bridge._session
+        set_m_s2 = session.set_m_s2
+        stop_m = 0.0 if set_m_s2 is None else session.cruise_speed_m_s**2 / (2.0 * set_m_s2)
         return any(
-            _near(place_m, _fenced(there_m, self.bridge.config))
+            _near(place_m, _fenced(there_m, self.bridge.config), stop_m)
             and any(
                 other is not told_m[place]
                 and math.dist(other[0], there_m) <= _LEAP_M + _FASTEST_M_S * abs(at_s - other[1])
@@ -498,5 +503,5 @@ def _fenced(place_m: Point, config: BridgeConfig) -> Point:
     return (east_m, north_m, up_m)
 
 
-def _near(a: Point, b: Point) -> bool:
-    return math.dist(a[:2], b[:2]) <= TOLERANCE_M and abs(a[2] - b[2]) <= TOLERANCE_M
+def _near(a: Point, b: Point, beside_m: float = 0.0) -> bool:
+    return math.dist(a[:2], b[:2]) <= beside_m + TOLERANCE_M and abs(a[2] - b[2]) <= TOLERANCE_M

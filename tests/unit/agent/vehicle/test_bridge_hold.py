@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
+import pytest
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 
 from agent.core.interface import (
@@ -329,6 +330,19 @@ def test_glitch_of_the_position_does_not_lead_the_vehicle_away(fake: type[FakeCo
     told_m = place_told(flight)
     assert told_m is None or math.dist(told_m, here_m) < 20.0
     assert math.dist(flight.copter.position_m, here_m) < 20.0
+    assert hovers(flight)
+
+
+def test_vehicle_is_told_to_stop_where_it_can_and_comes_back_to_nowhere() -> None:
+    """Others keep clear of its way to a stop, and not of any way back."""
+    flight = by_targets(FakeCopter)
+    flight.copter.heard.clear()
+    (east_m, north_m, _), (speed_m_s, *_) = flight.copter.position_m, flight.copter.velocity_m_s
+    flight.order(HOLD)
+    flight.run(5.0)
+    told_m = place_told(flight)
+    assert told_m is not None
+    assert told_m[:2] == pytest.approx((east_m + speed_m_s**2 / (2.0 * 2.5), north_m), abs=2.0)
     assert hovers(flight)
 
 
