@@ -36,7 +36,7 @@ from agent.core.take_off_turn import TakeOffTurn, who_is_in
 from swarm.protocol.board import ranks
 from swarm.protocol.events import Cell, MessageReceived, MessagesReceived, TuneIn
 from swarm.protocol.fields import Point
-from swarm.protocol.messages import Message, MissionConfig, Stamp
+from swarm.protocol.messages import Message, MissionConfig, PlanEpoch, Stamp
 from swarm.protocol.timing import earliest
 from swarm.protocol.uav_messages import MOST_CORNERS_AHEAD, Nearby
 from swarm.separation.straight_pieces import off_piece_m
@@ -102,6 +102,8 @@ class NearTraffic(AgentPart):
         self._resolver: TacticalResolver | None = None
         self._picture: TrafficPicture | None = None
         self._cell_m = 1.0
+        self._ranked_by: tuple[MissionConfig | None, PlanEpoch | None] = None, None
+        self._sequence_rank = self._rank_of(*self._ranked_by)
         self._telemetry: Telemetry | None = None
         self._way: tuple[Point, ...] = ()
         """Of the last order, from where the vehicle was on."""
@@ -317,7 +319,12 @@ class NearTraffic(AgentPart):
         """Among those of its grade; of those on their way home the lowest lands first."""
         if self._machine.state is AgentState.RETURNING_VIA_START:
             return max(0, round(telemetry.position_enu_m[2]))
-        brief, epoch = self._replica.brief, self._replica.epoch
+        ranked_by = self._replica.brief, self._replica.epoch
+        if self._ranked_by != ranked_by:
+            self._ranked_by, self._sequence_rank = ranked_by, self._rank_of(*ranked_by)
+        return self._sequence_rank
+
+    def _rank_of(self, brief: MissionConfig | None, epoch: PlanEpoch | None) -> int:
         fleet = [] if brief is None else [uav.id for uav in brief.uavs]
         by_place = fleet.index(self._uav) if self._uav in fleet else len(fleet)
         return by_place if epoch is None else ranks(epoch.sequence, fleet).get(self._uav, by_place)

@@ -208,6 +208,25 @@ def test_a_repositioning_may_give_the_speed_of_its_leg_alone() -> None:
     assert ground.position_enu_m[1] == pytest.approx(30.0, abs=0.01)
 
 
+def test_paused_on_its_way_it_brakes_and_does_not_come_back() -> None:
+    """It reckons itself where it can stop (navigator_main.cpp of 1.17, preproject_stop_point)."""
+    ground = airborne(acceleration_m_s2=2.0)
+    reposition(ground, 100.0)
+    ground.wait(6.0)
+    before_m, nowhere = ground.position_enu_m[1], (math.nan,) * 4
+    assert ground.command(mavlink.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, *nowhere) == ACCEPTED
+    norths_m = []
+    for _ in range(80):
+        ground.wait(0.1)
+        norths_m.append(ground.position_enu_m[1])
+
+    assert norths_m == sorted(norths_m)
+    assert norths_m[-1] - before_m == pytest.approx(
+        ground.vehicle.config.cruise_m_s**2 / 4.0, abs=1.5
+    )
+    assert norths_m[-1] == pytest.approx(norths_m[-20], abs=0.01)
+
+
 def test_an_ordered_speed_holds_for_later_legs_until_hold_is_entered_anew() -> None:
     ground = airborne()
     assert ground.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 8.0, -1) == ACCEPTED
