@@ -293,11 +293,8 @@ class VehicleSession(Conversation):
         home_alt_m = 0.0 if position is None else position.alt_m - position.relative_alt_m
         free = self.mission is None or not self.mission.is_transferring
         home_up_m = home_alt_m - self.config.origin.alt_m
-        way_m = (
-            None
-            if self.comes_back_into_zone
-            else self._braking_way_m(_HEEDS_S, self.acceleration_m_s2)
-        )
+        braking_m = self._braking_way_m(_HEEDS_S, self.acceleration_m_s2)
+        way_m = None if self.comes_back_into_zone else braking_m
         fence.advance(way_m, home_up_m, may_begin=free)
         return fence.objection
 
@@ -324,11 +321,13 @@ class VehicleSession(Conversation):
     def stops_at_m(self) -> Point | None:
         """Where it can stop if it brakes now, at its cruise speed at the most [m]; None: not known.
 
-        Where it is, if it can't hover, if how it brakes is not known, or if a zone is in the way.
+        Where it is, if it can't hover, if it is not known how it brakes or what it told last does
+        not count, or if a zone is in the way.
         """
-        hovers = self.firmware is None or self.firmware.traits.stays
-        if self.set_m_s2 is None or not hovers:
-            return self.known_place_m()
+        place_enu_m, firmware = self.known_place_m(), self.firmware
+        hovers = firmware is not None and firmware.traits.stays
+        if self.set_m_s2 is None or not hovers or place_enu_m != self.place_enu_m:
+            return place_enu_m
         way_m = self._braking_way_m(0.0, self.set_m_s2, self.cruise_speed_m_s)
         if way_m is None:
             return None
@@ -340,8 +339,8 @@ class VehicleSession(Conversation):
     ) -> tuple[Point, Point] | None:
         """From where the vehicle is to where it would stop if it began to brake so late.
 
-        A straight way [m; mission origin], as of one that flies no faster than ``most_m_s``; None:
-        not known.
+        A straight way [m; mission origin], braked on as from ``most_m_s`` at the most; None: not
+        known.
         """
         place_enu_m, position = self.known_place_m(), self.vehicle.position
         if place_enu_m is None or position is None:
@@ -349,10 +348,11 @@ class VehicleSession(Conversation):
         east_m_s, north_m_s, _ = position.velocity_enu_m_s
         flown_m_s = math.hypot(east_m_s, north_m_s)
         counted_m_s = min(flown_m_s, most_m_s)
-        lasts_s = heeds_s + min(counted_m_s / acceleration_m_s2, _BRAKES_S) / 2.0
-        lasts_s *= counted_m_s / flown_m_s if flown_m_s > 0.0 else 1.0
+        brakes_s = min(counted_m_s / acceleration_m_s2, _BRAKES_S)
+        far_m = heeds_s * flown_m_s + brakes_s / 2.0 * counted_m_s
+        far_s = far_m / flown_m_s if flown_m_s > 0.0 else 0.0
         east_m, north_m, up_m = place_enu_m
-        return place_enu_m, (east_m + lasts_s * east_m_s, north_m + lasts_s * north_m_s, up_m)
+        return place_enu_m, (east_m + far_s * east_m_s, north_m + far_s * north_m_s, up_m)
 
     def take_fence_off(self) -> bool:
         """Leave no fence of ours on a vehicle that has landed; whether that is over."""

@@ -235,6 +235,8 @@ class CommandExecutor:
             return _DENIED
         if not pilot.takes_targets and not pilot.set_mode(behaviour.for_reposition, now_s):
             return pilot.flavour.refusals.not_now
+        if target_enu_m is None and not pilot.armed:
+            return _ACCEPTED
         if target_enu_m is None:  # PX4 reckons where it can stop, and does not come back
             target_enu_m = pilot.flight.stopped_enu_m(now_s)
         elif not pilot.fence.allows_target(target_enu_m):

@@ -119,16 +119,15 @@ class TrafficTable:
         now_s: float,
         precedence: Sequence[int],
     ) -> tuple[bool, bool, bool]: ...
-    def is_close(
+    def free_s(
         self,
         place_m: Sequence[float],
         velocity_m_s: Sequence[float],
         path_m: Sequence[Sequence[float]],
         speed_m_s: float,
         now_s: float,
-        wait_s: float,
         gives_way: bool,
-    ) -> tuple[bool, bool]: ...
+    ) -> tuple[float, bool]: ...
 
 def good_tour(
     completion_s: Annotated[

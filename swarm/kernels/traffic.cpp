@@ -27,14 +27,13 @@ namespace {
 constexpr double kEndless = std::numeric_limits<double>::infinity();
 constexpr double kMostSteps = 100000.0;
 constexpr double kRoundingM = 1e-6;
-constexpr double kMostWaitS = 60.0;
 
 using Precedence = std::array<std::int64_t, 3>;  // grade, rank, depth
 
 // Numbers of a fleet; names and units as in swarm.separation.tactical_traffic.TrafficRules.
 struct Rules {
     double separation_m, apart_m, reach_m, fastest_m_s, acceleration_m_s2, climb_m_s, reaction_s,
-        tick_s, horizon_s, step_s, silent_s, forget_s, grid_m, wide_m, reach_slack_m,
+        tick_s, beacon_s, horizon_s, step_s, silent_s, forget_s, grid_m, wide_m, reach_slack_m,
         stands_m, most_column_m, column_step_m;
 
     double stop_m(double speed) const { return speed * speed / (2.0 * acceleration_m_s2); }
@@ -168,13 +167,13 @@ struct Track {
 
 class TrafficTable {
 public:
-    explicit TrafficTable(const std::array<double, 18>& r)
-        : rules_{r[0], r[1],  r[2],  r[3],  r[4],  r[5],  r[6],  r[7],  r[8],
-                 r[9], r[10], r[11], r[12], r[13], r[14], r[15], r[16], r[17]} {
-        require_finite("rules", r.data(), 12);
+    explicit TrafficTable(const std::array<double, 19>& r)
+        : rules_{r[0], r[1], r[2], r[3], r[4],  r[5],  r[6],  r[7],  r[8], r[9],
+                 r[10], r[11], r[12], r[13], r[14], r[15], r[16], r[17], r[18]} {
+        require_finite("rules", r.data(), 13);
         require_within("acceleration_m_s2", r[4], 1e-9, kEndless, "positive");
-        require_within("step_s", r[9], 1e-9, kEndless, "positive");
-        require_within("column_step_m", r[17], 1e-9, kEndless, "positive");
+        require_within("step_s", r[10], 1e-9, kEndless, "positive");
+        require_within("column_step_m", r[18], 1e-9, kEndless, "positive");
     }
 
     void hear(int number, const Vector& place, const Vector& velocity, std::vector<Vector> path,
@@ -223,27 +222,30 @@ public:
         return {any, false, false};
     }
 
-    // Whether somebody near is close, see swarm.separation.tactical_look.is_close, and whether some
-    // have been silent or are to be forgotten.
-    std::tuple<bool, bool> is_close(const Vector& place, const Vector& velocity,
+    // For how long nobody near is close, see swarm.separation.tactical_look.free_s, and whether some
+    // have been silent or are to be forgotten, and nothing is known therefore.
+    std::tuple<double, bool> free_s(const Vector& place, const Vector& velocity,
                                     std::vector<Vector> path, double speed, double now_s,
-                                    double wait_s, bool gives_way) const {
-        const Flown own = checked(place, velocity, std::move(path), speed);
-        require_within("wait_s", wait_s, 0.0, kMostWaitS, "0 or more, and at most a minute");
-        const double then_s = now_s + wait_s;
-        const Track me{own, now_s - rules_.tick_s, {}, false, 0.0};
-        const Cylinder mine = me.halts(rules_, then_s);
-        std::vector<double> stops;
-        bool close = false;
+                                    bool gives_way) const {
+        const Track me{checked(place, velocity, std::move(path), speed), now_s - rules_.tick_s, {},
+                       false, 0.0};
+        const auto most = static_cast<std::size_t>(
+            std::min(std::floor(rules_.beacon_s / rules_.step_s), kMostSteps));
+        std::vector<std::vector<double>> stops(most + 1);
+        std::size_t free = most;
         for (const auto& [number, track] : tracks_) {
             const double age = now_s - track.said_s;
-            if (age > rules_.forget_s) return {close, true};
+            if (age > rules_.forget_s) return {0.0, true};
             if (!is_near(track, place, age)) continue;
-            if (age > rules_.silent_s) return {close, true};
-            if (close || !(gives_way || track.precedence[0] != 0)) continue;
-            close = may_brake(track, me, mine, stops, then_s);
+            if (age > rules_.silent_s) return {0.0, true};
+            if (!(gives_way || track.precedence[0] != 0)) continue;
+            for (std::size_t step = 1; step <= free; ++step) {
+                if (may_brake(track, me, stops[step], now_s + step * rules_.step_s)) {
+                    free = step - 1;
+                }
+            }
         }
-        return {close, false};
+        return {free == most ? rules_.beacon_s : free * rules_.step_s, false};
     }
 
 private:
@@ -305,11 +307,14 @@ private:
         return least(all, {0.0, 0.0}) < least(1, {0.0, 0.0}) - rules_.grid_m + kRoundingM;
     }
 
-    // Either of two before the other, who may have turned while it flew on as it said.
-    bool may_brake(const Track& track, const Track& me, const Cylinder& mine,
-                   std::vector<double>& stops, double then_s) const {
+    // Either of two before the other, which may have turned while it flew on as it said; stops: of
+    // the one, once known.
+    bool may_brake(const Track& track, const Track& me, std::vector<double>& stops,
+                   double then_s) const {
         const double asked_m = rules_.separation_m + rules_.grid_m + rules_.wide_m;
-        if (mine.distance_m(track.halts(rules_, then_s)) >= asked_m) return false;
+        if (me.halts(rules_, then_s).distance_m(track.halts(rules_, then_s)) >= asked_m) {
+            return false;
+        }
         if (stops.empty()) stops = me.stops(rules_, then_s);
         const std::vector<double> theirs = track.stops(rules_, then_s);
         const auto is_barred_by = [&](const Track& turned) {
@@ -328,16 +333,15 @@ private:
 
 void bind_traffic(nb::module_& module) {
     nb::class_<TrafficTable>(module, "TrafficTable")
-        .def(nb::init<const std::array<double, 18>&>(), nb::arg("rules"))
+        .def(nb::init<const std::array<double, 19>&>(), nb::arg("rules"))
         .def("hear", &TrafficTable::hear, nb::arg("number"), nb::arg("place_m"),
              nb::arg("velocity_m_s"), nb::arg("path_m"), nb::arg("speed_m_s"), nb::arg("said_s"),
              nb::arg("precedence"))
         .def("forget", &TrafficTable::forget, nb::arg("number"))
         .def("look", &TrafficTable::look, nb::arg("place_m"), nb::arg("velocity_m_s"),
              nb::arg("path_m"), nb::arg("speed_m_s"), nb::arg("now_s"), nb::arg("precedence"))
-        .def("is_close", &TrafficTable::is_close, nb::arg("place_m"), nb::arg("velocity_m_s"),
-             nb::arg("path_m"), nb::arg("speed_m_s"), nb::arg("now_s"), nb::arg("wait_s"),
-             nb::arg("gives_way"));
+        .def("free_s", &TrafficTable::free_s, nb::arg("place_m"), nb::arg("velocity_m_s"),
+             nb::arg("path_m"), nb::arg("speed_m_s"), nb::arg("now_s"), nb::arg("gives_way"));
 }
 
 }  // namespace peckorder

@@ -28,6 +28,7 @@ class TrafficNumbers:
     climb_m_s: float
     reaction_s: float
     tick_s: float
+    beacon_s: float
     horizon_s: float
     step_s: float
     silent_s: float
@@ -85,17 +86,16 @@ class TrafficTable:
         """
         return self._table.look(place_m, velocity_m_s, path_m, speed_m_s, now_s, precedence)
 
-    def is_close(
+    def free_s(
         self,
         place_m: Vector,
         velocity_m_s: Vector,
         path_m: Sequence[Vector],
         speed_m_s: float,
         now_s: float,
-        wait_s: float,
         *,
         gives_way: bool,
-    ) -> tuple[bool, bool]:
-        """Whether anybody is close for so long, and whether that is not known, as of `look`."""
+    ) -> tuple[float, bool]:
+        """For how long nobody is close, and whether that is not known, as of `look`."""
         flown = place_m, velocity_m_s, path_m, speed_m_s
-        return self._table.is_close(*flown, now_s, wait_s, gives_way)
+        return self._table.free_s(*flown, now_s, gives_way)

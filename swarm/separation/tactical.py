@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -103,18 +103,21 @@ class TacticalResolver:
 
     def word(self, own: OwnFlight) -> TrafficWord:
         """What those near it have to know."""
+        flown = self._flown(own)
+        return replace(flown, path_enu_m=flown.path_enu_m[:MOST_CORNERS])
+
+    def _flown(self, own: OwnFlight) -> TrafficWord:
+        """The same with all its corners."""
         option, told = self._option, own.precedence
         path_m: tuple[Place, ...] = own.path_enu_m
         speed_m_s = own.speed_m_s
         if option is not None and own.gives_way:
             path_m, speed_m_s = option.path_enu_m, option.speed_m_s
             told = self._borrowed or told
-        return TrafficWord(
-            own.position_enu_m, own.velocity_enu_m_s, path_m[:MOST_CORNERS], speed_m_s, told
-        )
+        return TrafficWord(own.position_enu_m, own.velocity_enu_m_s, path_m, speed_m_s, told)
 
     def decide(self, own: OwnFlight, picture: TrafficPicture, now_s: float) -> Advice:
-        """What to do until the next decision, no later than a tick from now.
+        """What to do until the next decision, which comes as soon as `pace_s` says.
 
         Args:
             own: its flight.
@@ -174,7 +177,7 @@ class TacticalResolver:
         gives_way = self._advice.braked or self._advice.maneuver is not Maneuver.KEEP
         if gives_way or now_s - self._since_s < SILENT_S:
             return self._rules.tick_s
-        return pace_s(self.word(own), picture, self._rules, now_s, gives_way=own.gives_way)
+        return pace_s(self._flown(own), picture, self._rules, now_s, gives_way=own.gives_way)
 
     # -- those near it ------------------------------------------------------------------
 

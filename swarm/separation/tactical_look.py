@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 from swarm.kernels.motions import FloatArray, least_distance_m
-from swarm.separation.tactical_motion import GRID_M
+from swarm.separation.tactical_motion import GRID_M, STEP_S
 from swarm.separation.tactical_reach import Cylinder
 from swarm.separation.tactical_traffic import (
     WIDE_M,
@@ -62,58 +63,64 @@ def pace_s(
 ) -> float:
     """How long the next decision and the next word can wait after the last one [s].
 
-    A second, or half of it, unless somebody is close for so long, see `is_close`; else a tick.
+    A second, or half of it, if nobody is close for so long, see `free_s`; else a tick.
 
     Args:
-        word: of the own flight.
+        word: of the own flight, with all its corners.
         picture: those near it.
         rules: of the fleet.
         now_s: now, on the own clock.
         gives_way: whether it may be told otherwise than to fly on.
     """
-    for wait_s in (rules.beacon_s, rules.beacon_s / 2.0):
-        close = picture.is_close(word, now_s, wait_s, gives_way=gives_way)
-        if close is None:
-            close = is_close(word, picture, rules, now_s, wait_s, gives_way=gives_way)
-        if not close:
-            return wait_s
-    return rules.tick_s
+    long_s = picture.free_s(word, now_s, gives_way=gives_way)
+    if long_s is None:
+        long_s = free_s(word, picture, rules, now_s, gives_way=gives_way)
+    waits_s = rules.beacon_s, rules.beacon_s / 2.0
+    return next((wait_s for wait_s in waits_s if wait_s <= long_s), rules.tick_s)
 
 
-def is_close(
+def free_s(
     word: TrafficWord,
     picture: TrafficPicture,
     rules: TrafficRules,
     now_s: float,
-    wait_s: float,
     *,
     gives_way: bool,
-) -> bool:
-    """Whether it could make somebody brake to wait for so long.
+) -> float:
+    """For how long nobody is close: could have to brake if this one waited, or make it brake [s].
 
-    One of two that flies on as it said, for all that the other may do while it is not heard for so
-    much longer. Of two that can't give way neither brakes.
+    One of two that flies on as it said, for all that the other may do while it is not heard. Looked
+    at every `STEP_S` until `beacon_s`, as who brakes before a bend comes elsewhere than who brakes
+    behind it. Of two that can't give way neither brakes.
 
     Args:
-        word: of the own flight.
+        word: of the own flight, with all its corners.
         picture: those near it.
         rules: of the fleet.
         now_s: now, on the own clock.
-        wait_s: until the next decision and the next word.
         gives_way: whether it may be told otherwise than to fly on.
     """
-    asked_m = rules.separation_m + GRID_M + WIDE_M
-    me = NearbyTrack(word, now_s, rules.tick_s)
-    mine = me.reach_of_stops(now_s, rules, wait_s)
+    me, steps = NearbyTrack(word, now_s, rules.tick_s), math.floor(rules.beacon_s / STEP_S)
     near = [
         track
         for _, track in picture.near(word.position_enu_m, now_s)
-        if (gives_way or track.word.precedence.grade is not Grade.BOUND)
-        and mine.distance_m(track.reach_of_stops(now_s, rules, wait_s)) < asked_m
+        if gives_way or track.word.precedence.grade is not Grade.BOUND
     ]
-    my_stops_m, my_stray_m = me.stops_m(now_s, rules, wait_s)
-    for track in near:
-        stops_m, stray_m = track.stops_m(now_s, rules, wait_s)
-        if any(least_distance_m(my_stops_m, stops_m, by) < asked_m for by in (my_stray_m, stray_m)):
-            return True
-    return False
+    for step in range(1, steps + 1):
+        then_s = now_s + step * STEP_S
+        if any(_may_brake(me, track, then_s, rules) for track in near):
+            return (step - 1) * STEP_S
+    return rules.beacon_s
+
+
+def _may_brake(one: NearbyTrack, other: NearbyTrack, then_s: float, rules: TrafficRules) -> bool:
+    """Whether either would have to brake before the other, which may have turned meanwhile."""
+    asked_m = rules.separation_m + GRID_M + WIDE_M
+    halts = one.reach_of_stops(then_s, rules)
+    if halts.distance_m(other.reach_of_stops(then_s, rules)) >= asked_m:
+        return False
+    (some_m, one_stray_m), (others_m, other_stray_m) = (
+        track.stops_m(then_s, rules) for track in (one, other)
+    )
+    strays_m = one_stray_m, other_stray_m
+    return any(least_distance_m(some_m, others_m, stray_m) < asked_m for stray_m in strays_m)

@@ -105,9 +105,9 @@ class TrafficRules:
     reaction_s: float = 0.8
     """From a decision until the vehicle does it, at the most."""
     tick_s: float = 0.25
-    """Between two decisions, at the most, and between two words while somebody is close."""
+    """Between two decisions, and two words, while somebody is close."""
     beacon_s: float = 1.0
-    """Between two words else."""
+    """Between two words while nobody is, and twice what is between two decisions then."""
     low_m: float = -math.inf
     """No UAV gives way to below this height [m; mission origin]."""
     high_m: float = math.inf
@@ -290,27 +290,20 @@ class NearbyTrack:
         here_m, end_m = self.word.position_enu_m[2], self.word.path_enu_m[-1][2]
         return min(max(end_m, here_m - _MOST_COLUMN_M), here_m + _MOST_COLUMN_M)
 
-    def stops_m(
-        self, now_s: float, rules: TrafficRules, later_s: float = 0.0
-    ) -> tuple[FloatArray, tuple[float, float]]:
+    def stops_m(self, now_s: float, rules: TrafficRules) -> tuple[FloatArray, tuple[float, float]]:
         """Where it may be before it has stopped, however it decides until it hears more.
-
-        Args:
-            now_s: now, on the own clock.
-            rules: of the fleet.
-            later_s: with the same word so much later.
 
         Returns:
             Places along the way that it told, and how far from these it may be, see `stray_m`.
         """
-        age_s, word = max(0.0, now_s + later_s - self.said_s), self.word
+        age_s, word = max(0.0, now_s - self.said_s), self.word
         flown = word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s
         way_m = stopping_m(*flown, rules.agility, _drive_s(age_s, rules))
         return way_m, self._stray_m(age_s, rules)
 
-    def reach_of_stops(self, now_s: float, rules: TrafficRules, later_s: float = 0.0) -> Cylinder:
+    def reach_of_stops(self, now_s: float, rules: TrafficRules) -> Cylinder:
         """Holds all of `stops_m`, with what it may stray."""
-        age_s, word = max(0.0, now_s + later_s - self.said_s), self.word
+        age_s, word = max(0.0, now_s - self.said_s), self.word
         return reach(
             *(word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s),
             rules.agility,
@@ -408,24 +401,21 @@ class TrafficPicture:
         anybody, odd, in_way = self._table.look(*flown, now_s, precedence.numbers)
         return None if odd or in_way else anybody
 
-    def is_close(
-        self, word: TrafficWord, now_s: float, wait_s: float, *, gives_way: bool
-    ) -> bool | None:
-        """Whether anybody is close for so long, see `swarm.separation.tactical_look.is_close`.
+    def free_s(self, word: TrafficWord, now_s: float, *, gives_way: bool) -> float | None:
+        """For how long nobody is close, see `swarm.separation.tactical_look.free_s`.
 
         None: somebody has to be looked at for that.
 
         Args:
-            word: of the own flight.
+            word: of the own flight, with all its corners.
             now_s: now, on the own clock.
-            wait_s: until the next decision and the next word.
             gives_way: whether it may be told otherwise than to fly on.
         """
         if now_s < self._doubts_until_s:
             return None
         flown = word.position_enu_m, word.velocity_enu_m_s, word.path_enu_m, word.speed_m_s
-        is_close, odd = self._table.is_close(*flown, now_s, wait_s, gives_way=gives_way)
-        return None if odd else is_close
+        long_s, odd = self._table.free_s(*flown, now_s, gives_way=gives_way)
+        return None if odd else long_s
 
     def place_of(self, uav: str) -> Place | None:
         """Where a UAV said last that it is; None: it is not heard."""
@@ -484,6 +474,7 @@ def _numbers_of(rules: TrafficRules) -> TrafficNumbers:
         climb_m_s=rules.agility.climb_m_s,
         reaction_s=rules.reaction_s,
         tick_s=rules.tick_s,
+        beacon_s=rules.beacon_s,
         horizon_s=rules.horizon_s,
         step_s=STEP_S,
         silent_s=SILENT_S,

@@ -346,6 +346,19 @@ def test_vehicle_is_told_to_stop_where_it_can_and_comes_back_to_nowhere() -> Non
     assert hovers(flight)
 
 
+def test_while_what_it_tells_last_does_not_count_it_is_told_the_place_before() -> None:
+    """Its velocity came with a place that nothing bears out."""
+    flight = by_targets(FakeCopter)
+    flight.copter.heard.clear()
+    here_m = flight.copter.position_m
+    glitch(flight, -300.0)
+    flight.order(HOLD)
+    flight.step()
+    told_m = place_told(flight)
+    assert told_m is not None
+    assert math.dist(told_m[:2], here_m[:2]) < 3.0
+
+
 def test_px4_is_paused_without_any_place() -> None:
     flight = by_targets(FakePx4)
     flight.copter.heard.clear()

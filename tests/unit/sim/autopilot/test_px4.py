@@ -227,6 +227,15 @@ def test_paused_on_its_way_it_brakes_and_does_not_come_back() -> None:
     assert norths_m[-1] == pytest.approx(norths_m[-20], abs=0.01)
 
 
+def test_paused_while_it_falls_it_comes_down() -> None:
+    ground = airborne(acceleration_m_s2=2.0)
+    ground.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0.0, 21196.0)
+    ground.command(mavlink.MAV_CMD_DO_REPOSITION, -1.0, 1.0, 0.0, *(math.nan,) * 4)
+    ground.wait(20.0)
+
+    assert ground.position_enu_m[2] == pytest.approx(0.0, abs=0.01)
+
+
 def test_an_ordered_speed_holds_for_later_legs_until_hold_is_entered_anew() -> None:
     ground = airborne()
     assert ground.command(mavlink.MAV_CMD_DO_CHANGE_SPEED, 1, 8.0, -1) == ACCEPTED

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from swarm.separation.tactical import TacticalResolver
 from swarm.separation.tactical_advice import Maneuver, OwnFlight
 from swarm.separation.tactical_look import pace_s
-from swarm.separation.tactical_motion import Place
+from swarm.separation.tactical_motion import STEP_S, Place, motion_m
 from swarm.separation.tactical_traffic import (
     Grade,
     Precedence,
@@ -40,7 +40,7 @@ ages = st.floats(0.0, 8.0)
 def looked_closely(monkeypatch: pytest.MonkeyPatch) -> None:
     """From now on nothing is told by a glance."""
     monkeypatch.setattr(TrafficPicture, "glance", lambda *_, **__: None)
-    monkeypatch.setattr(TrafficPicture, "is_close", lambda *_, **__: None)
+    monkeypatch.setattr(TrafficPicture, "free_s", lambda *_, **__: None)
 
 
 def decided(
@@ -115,6 +115,33 @@ def test_while_one_takes_its_time_neither_has_to_brake(seed: int) -> None:
             assert not brakes(flown_on(own, later_s), other, age_s + later_s)
             assert not brakes(flown_on(other, age_s + later_s), own, age_s + later_s)
     assert 300 < takes_time < 390
+
+
+def round_a_bend(bend_m: float, after_s: float) -> OwnFlight:
+    """One that flies to the east at 10 m/s, and to the north after so many metres."""
+    corners = ((bend_m, 0.0, 30.0), (bend_m, 200.0, 30.0))
+    flown = (0.0, 0.0, 30.0), (10.0, 0.0, 0.0), corners, 10.0
+    way_m = motion_m(*flown, RULES.agility, math.inf, after_s + 2.0 * STEP_S)
+    here, after = way_m[round(after_s / STEP_S)], way_m[round(after_s / STEP_S) + 1]
+    velocity = tuple(((after - here) / STEP_S).tolist())
+    ahead = corners[1:] if here[1] > 0.1 else corners
+    return OwnFlight(tuple(here.tolist()), velocity, ahead, 10.0, Precedence(Grade.FLYING, 1))
+
+
+@pytest.mark.parametrize("bend_m", np.arange(6.0, 40.0, 2.0).tolist())
+def test_who_comes_to_a_bend_looks_at_stops_before_and_behind_it(bend_m: float) -> None:
+    """Braked before the bend it goes straight on, to where it does not come behind it."""
+    own, rng = round_a_bend(bend_m, 0.0), np.random.default_rng(0)
+    still = 0.0, 0.0, 0.0
+    for _ in range(40):
+        place = (*rng.uniform((5.0, -15.0), (60.0, 40.0)).tolist(), 30.0)
+        stands = OwnFlight(place, still, (), 10.0, Precedence(Grade.FLYING, 1))
+        picture = TrafficPicture(RULES, 225.0)
+        picture.hear("u9", word_of(stands), 0.0, 0.1)
+        wait_s = pace_s(word_of(own), picture, RULES, 0.0, gives_way=True)
+        for step in range(2, 1 + round(wait_s / STEP_S)):
+            after_s = step * STEP_S
+            assert not brakes(round_a_bend(bend_m, after_s), stands, 0.1 + after_s)
 
 
 def crossing(seed: int) -> list[tuple[Place, Place, float]]:
