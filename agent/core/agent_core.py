@@ -250,16 +250,16 @@ class AgentCore(AgentPart):
 
     @property
     def is_contested(self) -> bool:
-        """Whether what others claim matters at once: it has no task, or one not settled yet."""
-        return self.claim is not None and self.claim.phase is not ClaimPhase.HELD
+        """Whether what others claim matters at once: it has no task, or one that is new."""
+        return self._tasking.is_contested
 
     def run_since(self, since_s: float) -> None:
         """Its process has run without a stop since then, and it has heard all that came."""
         self._stall_detector.runs_since_s = since_s
 
     def next_own_deadline_s(self) -> float | None:
-        """When something is due about its own task, such as that it is served; None: nothing is."""
-        return self._tasking.next_deadline_s()
+        """When something is due about its own task; None: nothing is, or it waits for its way."""
+        return None if self._tasking.awaits_way else self._tasking.next_deadline_s()
 
     @property
     def claim(self) -> Claim | None:

@@ -328,6 +328,8 @@ class TaskAttempt:
 
     held_at_s: float | None = None
     """When the claim turns from proposed to held."""
+    awaits_way: bool = False
+    """Whether nobody has objected in time, and the claim is held as soon as the UAV departs."""
     ready_by_s: float | None = None
     """Until when the vehicle must be under command again, for an earlier life's claim to last."""
     served_at_s: float | None = None

@@ -210,6 +210,17 @@ class Tasking(AgentPart, ABC):
             else:
                 self._decide_in_field(now_s)
 
+    @property
+    def is_contested(self) -> bool:
+        """Whether what others claim matters at once: it has no task, or one that is new."""
+        claim = self.claim
+        return claim is not None and claim.phase is not ClaimPhase.HELD and not self.awaits_way
+
+    @property
+    def awaits_way(self) -> bool:
+        """Whether nobody has objected to its claim in time, and it waits for its way alone."""
+        return self._attempt.awaits_way
+
     def next_deadline_s(self) -> float | None:
         """When `advance` will next have something to do."""
         return earliest(self._attempt.next_deadline_s(), self._free.retry_at_s)
@@ -241,6 +252,7 @@ class Tasking(AgentPart, ABC):
         elif attempt.held_at_s is not None and attempt.held_at_s <= now_s:
             # While it waits for its way, for seconds at most: with its departure it is one word.
             attempt.held_at_s = now_s + self._timing.objection_window_s if waits else None
+            attempt.awaits_way = waits
             if not waits:
                 self._say(replace(claim, phase=ClaimPhase.HELD))
 

@@ -59,7 +59,7 @@ from swarm.runtime.turns import Alarm, SharedProcess
 
 TURN = 20
 """Events from the bus between two looks at everything else."""
-GATHER_S = 0.05
+GATHER_S = 0.1
 """In a large fleet: wall time between two looks at what has come of claims, outcomes and board.
 With the time that a router collects them, less than claims may be contested on any network."""
 GATHER_SETTLED_S = 0.5

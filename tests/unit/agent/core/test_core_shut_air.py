@@ -226,8 +226,11 @@ def test_who_waits_for_its_way_holds_its_task_in_the_word_of_its_departure(scrip
     script.items = ["t1"]
     agent.post(entry("t1", 100.0))
     assert (agent.task, agent.phase) == ("t1", ClaimPhase.PROPOSED)
+    assert agent.core.is_contested
     agent.run_until(3.0)
     assert claims(agent.log)[-1].phase is ClaimPhase.PROPOSED
+    assert not agent.core.is_contested
+    assert agent.core.next_own_deadline_s() is None
     before = len(claims(agent.log))
 
     fleet.other_flies(*FAR_AWAY)
