@@ -223,12 +223,14 @@ class Airway(WayFlown):
         if not self._aloft:
             self._stand.wait(self._replica.claims.get(self._uav))
         elif self._moves and not self._halt.under_way:
-            self._fly_on(self._wish)
+            self._fly_on(self._fleet.shared, self._wish)
 
-    def _fly_on(self, wish: Wish) -> None:
+    def _fly_on(self, air: SharedAir, wish: Wish) -> None:
         """Fly on if that is as wished, to the end of what is its own at least; else stop."""
         way, place, corners = self._told_way, self._vehicle.enu_m, wish.corners_enu_m
-        if place is None:
+        known = self._claims(), self._fleet.expired()
+        if place is None or not (way.flies or air.is_granted(self._uav, *known)):
+            self._stop()  # an earlier life asked for it, and may have waited for it
             return
         same_end = self._own_height == wish.own_height
         if same_end and (left := left_of_way(way, place, corners, wish.end_enu_m)) is not None:
@@ -493,8 +495,6 @@ class Airway(WayFlown):
         self._goes_aside = wish is self._aside
         self._halt.end()
         self._actions.append(OrderVehicle(wish.along(path)))
-
-    # -- pieces -----------------------------------------------------------------------------------
 
     def _claims(self) -> Mapping[str, Claim]:
         return self._fleet.claims_with(self.told(self._replica.claims[self._uav]))

@@ -5,9 +5,10 @@ from __future__ import annotations
 import pytest
 
 from agent.core.fleet_air import STOP_LEG
-from agent.core.interface import Arrived, GoTo, Refused, Return
+from agent.core.interface import Arrived, GoTo, Refused, Return, VehicleReady
 from agent.core.last_departure import LEAVES_ZONE_S
 from agent.core.states import AgentState
+from swarm.model.ids import COORDINATOR
 from swarm.protocol.events import LinkChanged
 from swarm.protocol.messages import CommandKind
 from swarm.protocol.uav_messages import ClaimPhase
@@ -241,3 +242,22 @@ def test_who_waits_for_its_way_holds_its_task_in_the_word_of_its_departure(scrip
     departs = [claim for claim in told if claim.way is not None and claim.way.flies]
     assert {claim.phase for claim in departs} == {ClaimPhase.HELD}
     assert agent.phase is ClaimPhase.HELD
+
+
+def test_who_waited_for_its_way_in_an_earlier_life_does_not_take_it_for_granted(
+    script: Script,
+) -> None:
+    fleet = Fleet(entry("t0", 100.0))
+    fleet.other_flies(*ACROSS)
+    script.items = ["t1"]
+    fleet.agent.post(entry("t1", 100.0))
+    fleet.agent.run_until(3.0)
+
+    agent = fleet.agent.reborn()
+    agent.see(COORDINATOR, "u1")
+    agent.learn_what_was_known_to(fleet.agent)
+    agent.be_at((0.0, 0.0, 10.0))
+    agent.happen(VehicleReady())
+
+    assert agent.task == "t1"
+    assert [order.leg for order in orders(agent.log) if isinstance(order, GoTo)] == [STOP_LEG]
