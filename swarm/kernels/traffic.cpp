@@ -230,7 +230,7 @@ public:
         const Track me{checked(place, velocity, std::move(path), speed), now_s - rules_.tick_s, {},
                        false, 0.0};
         const auto most = static_cast<std::size_t>(
-            std::min(std::floor(rules_.beacon_s / rules_.step_s), kMostSteps));
+            std::min(std::ceil(rules_.beacon_s / rules_.step_s), kMostSteps));
         std::vector<std::vector<double>> stops(most + 1);
         std::size_t free = most;
         for (const auto& [number, track] : tracks_) {

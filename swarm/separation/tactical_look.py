@@ -100,7 +100,7 @@ def free_s(
         now_s: now, on the own clock.
         gives_way: whether it may be told otherwise than to fly on.
     """
-    me, steps = NearbyTrack(word, now_s, rules.tick_s), math.floor(rules.beacon_s / STEP_S)
+    me, steps = NearbyTrack(word, now_s, rules.tick_s), math.ceil(rules.beacon_s / STEP_S)
     near = [
         track
         for _, track in picture.near(word.position_enu_m, now_s)

@@ -117,6 +117,18 @@ def test_while_one_takes_its_time_neither_has_to_brake(seed: int) -> None:
     assert 300 < takes_time < 390
 
 
+def test_however_short_a_wait_is_it_is_looked_who_is_close() -> None:
+    rules = replace(RULES, beacon_s=0.2, tick_s=0.05)
+    place, velocity = (0.0, 0.0, 30.0), (8.0, 0.0, 0.0)
+    mine = TrafficWord(place, velocity, ((60.0, 0.0, 30.0),), 8.0, Precedence(Grade.FLYING, 1))
+    stands = replace(mine, position_enu_m=(20.0, 0.0, 30.0), velocity_enu_m_s=(0.0, 0.0, 0.0))
+    picture = TrafficPicture(rules, 225.0)
+    picture.hear("u9", replace(stands, path_enu_m=()), 0.0, 0.0)
+
+    assert picture.free_s(mine, 0.0, gives_way=True) == 0.0
+    assert pace_s(mine, picture, rules, 0.0, gives_way=True) == rules.tick_s
+
+
 def round_a_bend(bend_m: float, after_s: float) -> OwnFlight:
     """One that flies to the east at 10 m/s, and to the north after so many metres."""
     corners = ((bend_m, 0.0, 30.0), (bend_m, 200.0, 30.0))
