@@ -68,8 +68,8 @@ class StateSync(AgentPart):
 
     # -- what is said -----------------------------------------------------------------
 
-    def hear(self, message: Message, now_s: float) -> None:
-        """Somebody says so just now."""
+    def hear(self, message: Message, now_s: float, waited_s: float = 0.0) -> None:
+        """Somebody has just said so; it may have ``waited_s`` in this process to be heard [s]."""
         writer, body = message.writer, message.body
         if writer == self._uav:
             if self._announcer.is_foreign(message):
@@ -90,7 +90,7 @@ class StateSync(AgentPart):
         # What was said before tells what time it is only to whom nothing else does.
         is_word = self._replica.epoch_stamp != known or not self._mission_view.clock.is_set
         if is_word and isinstance(body, PlanEpoch) and body.phase is MissionPhase.RUNNING:
-            self._set_clock(body.mission_s, now_s)
+            self._set_clock(body.mission_s + waited_s, now_s)
 
     def without_repeated(
         self, event: MessageReceived | MessagesReceived, now_s: float
@@ -111,7 +111,7 @@ class StateSync(AgentPart):
                 self._peers.heard(message, self._replica, now_s)
             else:
                 news.append(message)
-        return MessagesReceived(tuple(news))
+        return MessagesReceived(tuple(news), event.waited_s)
 
     def learn(self, snapshots: Sequence[Snapshot], now_s: float) -> None:
         """The answers to a question."""

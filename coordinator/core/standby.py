@@ -147,7 +147,7 @@ class StandbyCore:
             case MessageReceived() | MessagesReceived():
                 for message in event.messages:
                     self._membership.heard(message.writer, now_s)
-                    self._take_in(message, now_s)
+                    self._take_in(message, now_s - event.waited_s)
             case SnapshotsReceived(snapshots):
                 self._state_query.answered()
                 for snapshot in snapshots:
@@ -179,13 +179,13 @@ class StandbyCore:
             case _:
                 pass
 
-    def _take_in(self, message: Message, now_s: float) -> None:
+    def _take_in(self, message: Message, arrived_s: float) -> None:
         brief, epoch, body = self._replica.brief, self._replica.epoch, message.body
         if not self._replica.join(message):
             return
         self._clock.heed(body, brief, epoch)
         if isinstance(body, PlanEpoch) and body.phase is MissionPhase.RUNNING:
-            self._clock.hear(body.mission_s, now_s)
+            self._clock.hear(body.mission_s, arrived_s)
 
     def _wait(self, since_s: float) -> None:
         """Give the coordinator the time that it has from ``since_s`` on."""

@@ -156,7 +156,7 @@ class MissionState:
                     ask |= self._welcome_back(message.writer, now_s)
                 if message.writer == COORDINATOR:
                     self._hear_coordinator(message, now_s)
-                self.take_note(message, now_s)
+                self.take_note(message, now_s, fact.waited_s)
                 ask |= self._names_unknown(message.body)
             case SnapshotsReceived(snapshots):
                 self._asking.answered()
@@ -342,8 +342,11 @@ class MissionState:
 
     # -- what was said ------------------------------------------------------------------
 
-    def take_note(self, message: Message, now_s: float) -> None:
-        """Take in what somebody says, be it this very process."""
+    def take_note(self, message: Message, now_s: float, waited_s: float = 0.0) -> None:
+        """Take in what somebody says, be it this very process.
+
+        It may have ``waited_s`` in this process to be heard [s].
+        """
         writer = message.writer
         if isinstance(message.body, Status):
             before = self.statuses.get(writer)
@@ -366,7 +369,7 @@ class MissionState:
         self.flights.hear(writer, message.body, self.mission_s(now_s))
         match message.body:
             case PlanEpoch() as epoch:
-                self._hear_epoch(epoch, now_s)
+                self._hear_epoch(epoch, now_s, now_s - waited_s)
             case Outcome() as outcome if earlier is not None:
                 if not self._is_another_visit(outcome, earlier):
                     return
@@ -405,11 +408,11 @@ class MissionState:
         self._repeated_visits += 1
         return True
 
-    def _hear_epoch(self, epoch: PlanEpoch, now_s: float) -> None:
+    def _hear_epoch(self, epoch: PlanEpoch, now_s: float, arrived_s: float) -> None:
         lists = tuple((uav, tasks) for uav, tasks in sorted(epoch.routes.items()))
         course = epoch.number, epoch.rule, epoch.sequence, lists
         if epoch.phase is MissionPhase.RUNNING:
-            self._clock.hear(epoch.mission_s, now_s)
+            self._clock.hear(epoch.mission_s, arrived_s)
         if epoch.phase is MissionPhase.RUNNING:
             if course not in self._epochs:
                 self._epochs.append(course)

@@ -34,6 +34,8 @@ class Sample:
 
     key: str
     payload: bytes
+    arrived_s: float | None = field(default=None, compare=False)
+    """When it came, in the time of the reader's loop; None: that was not noted."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -93,9 +93,6 @@ class SharedSeats:
         self._dropped = 0
         self._gathered_s = -math.inf
         """When the bus was last asked for what waits, in the loop's time."""
-        self._rounds = 0
-        """How often something was handed round, each time beginning with another seat: who always
-        comes after dozens of others takes the time of a mission to be earlier than it is."""
         self._unsaid: list[Sample] = []
         """What is to be said on the bus with the next that must not be lost, or soon."""
 
@@ -292,11 +289,8 @@ class SharedSeats:
             maybe = [each for each in self._subscribed if each.endswith(ends)]
             matching = [each for each in maybe if _matches(each, sample.key)]
             self._matching[sample.key] = matching
-        self._rounds += 1
         for key_expr in matching:
-            hearers = self._hearers[key_expr]
-            first = self._rounds % len(hearers)
-            for seat, how in (*hearers[first:], *hearers[:first]):
+            for seat, how in self._hearers[key_expr]:
                 if seat is but:
                     continue
                 if how.gathered:
@@ -333,7 +327,7 @@ class SharedSeat:
     def publish(self, key: str, payload: bytes, *, reliable: bool = True) -> None:
         """Say ``payload`` on ``key``; see `swarm.bus.port.Bus.publish`."""
         self._open_bus()
-        sample = Sample(check_key(key), bytes(check_payload(payload)))
+        sample = Sample(check_key(key), bytes(check_payload(payload)), self._loop.time())
         self._seats.publish(self, sample, reliable=reliable)
 
     def subscribe(self, key_expr: str, *, latest: bool = False, gathered: bool = False) -> None:

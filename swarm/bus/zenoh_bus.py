@@ -419,7 +419,8 @@ class ZenohBus:
 
     def _on_sample(self, key_expr: str, sample: zenoh.Sample) -> None:
         if sample.kind == zenoh.SampleKind.PUT and not self._closed:
-            self._offer(key_expr, Sample(str(sample.key_expr), sample.payload.to_bytes()))
+            key, payload = str(sample.key_expr), sample.payload.to_bytes()
+            self._offer(key_expr, Sample(key, payload, self._loop.time()))
 
     def _offer(self, key_expr: str, event: Sample) -> None:
         if (how := self._subscribed.get(key_expr)) is not None:

@@ -14,6 +14,8 @@ class MessageReceived:
     """A checked message arrived while it was new."""
 
     message: Message
+    waited_s: float = field(default=0.0, compare=False)
+    """How long it has waited in this process to be heard [s of ``now_s``]."""
 
     @property
     def messages(self) -> tuple[Message, ...]:
@@ -27,6 +29,8 @@ class MessagesReceived:
     hear of it."""
 
     messages: tuple[Message, ...]
+    waited_s: float = field(default=0.0, compare=False)
+    """How long the last of them has waited in this process to be heard [s of ``now_s``]."""
 
 
 @dataclass(frozen=True, slots=True)

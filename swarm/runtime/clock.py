@@ -20,6 +20,11 @@ class Clock(Protocol):
         """Wall seconds that pass while this clock advances by ``delay_s``."""
 
 
+def elapsed_s(clock: Clock, wall_s: float) -> float:
+    """How far ``clock`` advances in ``wall_s`` wall seconds [s]."""
+    return wall_s / clock.wall_delay_s(1.0)
+
+
 class SystemClock:
     """The machine's monotonic clock."""
 

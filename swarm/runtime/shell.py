@@ -50,7 +50,7 @@ from swarm.protocol.messages import (
 )
 from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind
 from swarm.protocol.uav_messages import News
-from swarm.runtime.clock import Clock
+from swarm.runtime.clock import Clock, elapsed_s
 from swarm.runtime.drop_count import DropCount
 from swarm.runtime.joining import gathered_keys
 from swarm.runtime.log import get_logger
@@ -411,7 +411,7 @@ class Shell(Generic[E, A]):
             self._unread.extend(self._bus.inbox.take())
             if not self._unread:  # it was gathered meanwhile
                 continue
-            if self._turns is not None and not self._tells_time():
+            if self._turns is not None:
                 await self._turns.mine()
             self._drops.take()
             while self._unread:
@@ -419,11 +419,11 @@ class Shell(Generic[E, A]):
                 if self._unread:  # the vehicle must not wait for a flood of words
                     await asyncio.sleep(0)
 
-    def _tells_time(self) -> bool:
-        """Whether a word is there by which the time of the mission is known: waiting ages it."""
-        return any(
-            isinstance(each, Sample) and each.key == self._keys.plan for each in self._unread
-        )
+    def _waited_s(self, sample: Sample) -> float:
+        """How long it has been here, behind what dozens of others of this process heard."""
+        if sample.arrived_s is None:
+            return 0.0
+        return elapsed_s(self._clock, max(0.0, self._loop.time() - sample.arrived_s))
 
     def _read(self, most: int) -> None:
         """Let the core hear the oldest that it has not, so many at most."""
@@ -431,19 +431,21 @@ class Shell(Generic[E, A]):
             event = self._unread.popleft()
             if isinstance(event, Sample):
                 message = self._message(event)
-                if message is not None and self._gathering is not None:
-                    self._heard.append(message)
+                if message is not None and self._gathering is None:
+                    self.step(self._from_bus(MessageReceived(message, self._waited_s(event))))
                 elif message is not None:
-                    self.step(self._from_bus(MessageReceived(message)))
+                    self._heard.append(message)
+                    if event.key == self._keys.plan:  # by which the time of the mission is known
+                        self._tell_heard(self._waited_s(event))
             elif (fact := self._fact(event)) is not None:
                 self._tell_heard()
                 self.step(self._from_bus(fact))
         self._tell_heard()
 
-    def _tell_heard(self) -> None:
+    def _tell_heard(self, last_waited_s: float = 0.0) -> None:
         if self._heard and self._together is not None:
             heard, self._heard = self._heard, []
-            self._step(self._together(MessagesReceived(tuple(heard))))
+            self._step(self._together(MessagesReceived(tuple(heard), last_waited_s)))
 
     def _tell_newer(self) -> None:
         """Tell people once of each kind: it is no fault to be of another release."""

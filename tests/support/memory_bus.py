@@ -242,7 +242,7 @@ class MemoryBus:
         """Send ``payload`` on ``key``."""
         self._check_open()
         check_payload(payload)
-        self._hub.publish(self._seat, Sample(check_key(key), bytes(payload)))
+        self._hub.publish(self._seat, Sample(check_key(key), bytes(payload), self._loop.time()))
 
     def subscribe(self, key_expr: str, *, latest: bool = False, gathered: bool = False) -> None:
         """Receive a `Sample` for everything others publish on ``key_expr``."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from swarm.model.ids import COORDINATOR
-from swarm.protocol.events import MessageReceived, SnapshotsReceived
+from swarm.protocol.events import MessageReceived, MessagesReceived, SnapshotsReceived
 from swarm.protocol.messages import MissionPhase, Snapshot
 from swarm.protocol.mission_clock import WORDS_KEPT
 from tests.support.builders import MISSION, entry, epoch, message, uav
@@ -35,6 +35,20 @@ def test_an_agent_that_heard_of_the_start_late_is_put_right_by_the_next_announce
     assert done == [13.0]
     assert agent.claim is not None
     assert (agent.claim.decided_s, agent.claim.completion_s) == (13.0, 53.0)
+
+
+def test_what_an_announcement_has_waited_in_this_process_makes_it_no_earlier() -> None:
+    agent = ready()
+    start = agent.statement(COORDINATOR, epoch("u0", mission_s=0.0))
+    agent.happen(MessageReceived(start, waited_s=0.75), 0.75)
+    assert mission_s(agent) == 0.75
+
+    next_one = agent.statement(COORDINATOR, epoch("u0", mission_s=4.0))
+    agent.happen(MessagesReceived((next_one,), waited_s=0.5), 5.0)
+    assert mission_s(agent) == 5.0
+    last = agent.statement(COORDINATOR, epoch("u0", mission_s=6.0))
+    agent.happen(MessagesReceived((last,), waited_s=0.5), 6.0)
+    assert mission_s(agent) == 6.5
 
 
 def test_a_later_announcement_that_was_long_under_way_changes_nothing() -> None:

@@ -301,10 +301,11 @@ def test_it_takes_over_with_all_that_it_has_heard() -> None:
 
 def test_mission_time_is_by_the_word_that_was_least_under_way() -> None:
     watcher = Watcher().watching()
-    for counter, (at_s, delay_s) in enumerate([(10.0, 3.0), (20.0, 0.1), (30.0, 0.9)], 100):
+    words = [(10.0, 3.0, 0.0), (20.0, 0.5, 0.4), (30.0, 0.9, 0.0)]
+    for counter, (at_s, delay_s, waited_s) in enumerate(words, 100):
         watcher.now_s = 98.0 + at_s + delay_s
-        said = epoch("u0", mission_s=at_s)
-        watcher.happen(MessageReceived(message(COORDINATOR, said, counter, incarnation=9)))
+        said = message(COORDINATOR, epoch("u0", mission_s=at_s), counter, incarnation=9)
+        watcher.happen(MessageReceived(said, waited_s))
 
     assert watcher.core.memory(140.0).mission_s == 42.0
 

@@ -212,6 +212,13 @@ def test_who_heard_of_the_start_late_is_put_right_by_the_next_announcement() -> 
     assert observer.mission_state.mission_s(observer.now_s) == 1.0
 
 
+def test_what_an_announcement_has_waited_here_makes_it_no_earlier() -> None:
+    observer = Onlooker()
+    said = observer.statement(COORDINATOR, epoch("u0", "u1", mission_s=4.0))
+    observer.happen(MessageReceived(said, waited_s=0.75), 10.0)
+    assert observer.mission_state.mission_s(observer.now_s) == 4.75
+
+
 def test_one_who_joins_late_tells_what_was_before_at_its_own_time() -> None:
     observer = Onlooker(replace(FLOWN, tasks=()))
     said = [observer.statement(COORDINATOR, epoch("u0", "u1", mission_s=40.0))]

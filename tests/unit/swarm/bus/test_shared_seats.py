@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable
 
 import pytest
 
-from swarm.bus.port import BusEvent, Inbox, LinkDown, LinkUp, Sample, TokenGone, TokenSeen
+from swarm.bus.port import BusEvent, LinkDown, LinkUp, Sample, TokenGone, TokenSeen
 from swarm.bus.shared_seats import SharedSeat, SharedSeats
 from swarm.runtime.errors import BusError
 from tests.support.memory_bus import MemoryBus, MemoryNetwork
@@ -256,33 +256,6 @@ def test_a_bug_in_handing_round_leaves_nobody_deaf(monkeypatch: pytest.MonkeyPat
         for seat in (a, b):
             seat.close()
         assert opened[0].closed == 1
-
-    play(scenario)
-
-
-def test_each_seat_is_the_first_to_hear_in_its_turn(monkeypatch: pytest.MonkeyPatch) -> None:
-    offer, order = Inbox.offer, list[Inbox]()
-
-    def noted(
-        self: Inbox, event: BusEvent, latest: bool = False, *, admitted: bool = False
-    ) -> None:
-        if isinstance(event, Sample) and admitted:
-            order.append(self)
-        offer(self, event, latest, admitted=admitted)
-
-    monkeypatch.setattr(Inbox, "offer", noted)
-
-    async def scenario(seats: SharedSeats, opened: list[RecordedBus]) -> None:
-        abc = await three(seats)
-        for seat in abc:
-            seat.subscribe("plan")
-        other = opened[0].network.join("another process")
-        for number in range(6):
-            other.publish("plan", bytes([number]))
-        await settled()
-
-        firsts = order[::3]
-        assert [firsts.count(seat.inbox) for seat in abc] == [2, 2, 2]
 
     play(scenario)
 

@@ -9,11 +9,18 @@ import pytest
 
 from swarm.model.ids import COORDINATOR
 from swarm.protocol.encoding import encode
-from swarm.protocol.events import CommonEvent, LinkChanged, MessageReceived, Tick
+from swarm.protocol.events import (
+    CommonEvent,
+    LinkChanged,
+    MessageReceived,
+    MessagesReceived,
+    Tick,
+)
+from swarm.protocol.timing import UNSTRETCHED_UAVS
 from swarm.runtime.turns import SharedProcess, Turns
 from tests.support.builders import epoch, message
 from tests.support.scripted_shell import CLAIM, Action, ScriptedCore, at_work
-from tests.support.shell_play import play, until
+from tests.support.shell_play import LIMIT_S, play, until
 
 PLACE, LATER_PLACE, NEWS = LinkChanged(True), LinkChanged(False), Tick()
 """Events of a scripted core in the place of what a vehicle tells."""
@@ -112,8 +119,7 @@ def test_what_comes_to_press_while_it_waits_for_its_turn_is_done_then(
     play(scenario)
 
 
-@pytest.mark.parametrize("tells_time", [False, True])
-def test_words_wait_for_their_turn_but_those_by_which_the_time_is_known(tells_time: bool) -> None:
+def test_words_wait_for_their_turn() -> None:
     async def scenario() -> None:
         shared, core, turns_left = SharedProcess(), ScriptedCore(), 1000
 
@@ -126,11 +132,52 @@ def test_words_wait_for_their_turn_but_those_by_which_the_time_is_known(tells_ti
             for _ in range(turns_left):
                 shared.turns.put_off(others)
             core.heard.clear()
-            said = EPOCH if tells_time else CLAIM
-            played.other.publish(said.key, encode(said))
+            played.other.publish(CLAIM.key, encode(CLAIM))
             await until(lambda: bool(core.heard), "hearing it")
 
-            assert (turns_left > 900) is tells_time
+            assert turns_left == 0
+
+    play(scenario)
+
+
+@pytest.mark.parametrize("crowd", [False, True])
+def test_how_long_what_is_said_of_the_time_has_waited_is_told(
+    crowd: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def scenario() -> None:
+        words = list[MessageReceived | MessagesReceived]()
+
+        def alone(heard: CommonEvent) -> tuple[()]:
+            if isinstance(heard, MessageReceived):
+                words.append(heard)
+            return ()
+
+        def together(heard: MessagesReceived) -> CommonEvent:
+            words.append(heard)
+            return Tick()
+
+        loop, behind_s = asyncio.get_running_loop(), 0.0
+        shared, core, now_s = SharedProcess(), ScriptedCore(alone), loop.time
+        monkeypatch.setattr(loop, "time", lambda: now_s() + behind_s)
+
+        def others() -> None:
+            nonlocal behind_s
+            behind_s += 0.01
+
+        async with at_work(core, shared=shared, together=together) as played:
+            await asyncio.sleep(0)
+            if crowd:
+                played.shell.suit_fleet(UNSTRETCHED_UAVS + 1)
+            for _ in range(100):
+                shared.turns.put_off(others)
+            played.other.publish(EPOCH.key, encode(EPOCH))
+            await until(lambda: bool(words), "hearing it")
+
+            (heard,) = words
+            assert isinstance(heard, MessagesReceived) is crowd
+            assert heard.messages == (EPOCH,)
+            waited_s = played.clock.wall_delay_s(1.0) * heard.waited_s  # on the wall
+            assert 1.0 - 1e-9 <= waited_s < 1.0 + LIMIT_S
 
     play(scenario)
 
