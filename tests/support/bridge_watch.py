@@ -370,7 +370,9 @@ class BridgeWatch:
     def _see_what_was_left(self) -> None:
         mission, origin = self.bridge._session.mission, self.bridge.config.origin
         if mission is not None and mission._inherited and mission._standing is not None:
-            self._left_m = tuple(enu_from_wgs84(origin, *c) for c in mission._standing.corners)
+            left = mission._standing
+            place = left.lat_deg, left.lon_deg, left.alt_m
+            self._left_m = tuple(enu_from_wgs84(origin, *c) for c in (*left.corners, place))
 
     def _see_place(self, message: Any, phases: set[FlightPhase]) -> None:
         config = self.bridge.config
