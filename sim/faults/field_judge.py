@@ -132,20 +132,25 @@ class FieldJudge:
     # -- zones --------------------------------------------------------------------------
 
     def _intrusions(self, zones: Sequence[DrawnZone]) -> Iterable[str]:
+        import shapely
+
         margin_m = self.world.mission.zone_margin_m
         speeds_m_s = {str(uav.id): uav.speed_m_s for uav in self.world.mission.uavs}
         for drawn in zones:
             for uav, track in self.world.tracks.items():
                 beside_m = self.astray_m + self.stale_s * speeds_m_s[uav]
                 forbidden = _forbidden(drawn.zone, margin_m, beside_m)
+                whole = _forbidden(drawn.zone, margin_m, 0.0)
                 since_s = drawn.heeded_by_s(uav, self.reaction_s)
                 if since_s == math.inf:
                     continue
                 leaves_s = self._leaves_s(uav, since_s, forbidden) if drawn.since_s > 0.0 else 0.0
                 outside, cut_s = leaves_s == 0.0, min(max(since_s, leaves_s), drawn.until_s)
                 pieces = [*track.pieces(since_s, cut_s), *track.pieces(cut_s, drawn.until_s)]
-                for begin_s, enters in _chords_in(pieces, drawn.zone, forbidden, self.astray_m):
-                    outside = outside or not enters
+                for begin_s, place in _chords_in(pieces, drawn.zone, self.astray_m):
+                    enters = place is not None and bool(shapely.intersects(forbidden, place))
+                    # Who is astray by what is forgiven has not left yet.
+                    outside = outside or place is None or not shapely.intersects(whole, place)
                     if enters and (outside or begin_s >= leaves_s):
                         yield f"{uav} in {drawn.zone.id} at {begin_s:.3f} s"
                         break
@@ -250,11 +255,11 @@ def _forbidden(zone: Zone, margin_m: float, astray_m: float) -> shapely.Geometry
 
 
 def _chords_in(
-    pieces: Iterable[MotionPiece], zone: Zone, forbidden: shapely.Geometry, astray_m: float
-) -> Iterator[tuple[float, bool]]:
-    """When each chord of a flight begins [s], and whether it meets what is forbidden.
+    pieces: Iterable[MotionPiece], zone: Zone, astray_m: float
+) -> Iterator[tuple[float, shapely.Geometry | None]]:
+    """When each chord of a flight begins [s], and what of it is at the heights of a zone.
 
-    That is so by its heights where they are farther than ``astray_m`` from floor and ceiling.
+    That is so where it is farther than ``astray_m`` from floor and ceiling; else None.
     """
     import shapely
 
@@ -262,12 +267,14 @@ def _chords_in(
         instants_s, places = _chords(piece)
         heights_m = [up_m for _, _, up_m in places]
         if not zone.concerns(min(heights_m) + astray_m, max(heights_m) - astray_m):
-            yield piece.begin_s, False
+            yield piece.begin_s, None
             continue
         for begin_s, (one, other) in zip(instants_s, pairwise(places), strict=False):
             flat = one[:2], other[:2]
-            chord = shapely.Point(flat[0]) if flat[0] == flat[1] else shapely.LineString(flat)
-            yield begin_s, bool(shapely.intersects(forbidden, chord))
+            yield (
+                begin_s,
+                shapely.Point(flat[0]) if flat[0] == flat[1] else shapely.LineString(flat),
+            )
 
 
 def _chords(piece: MotionPiece) -> tuple[list[float], list[Point]]:

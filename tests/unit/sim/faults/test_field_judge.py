@@ -255,6 +255,19 @@ def test_who_is_astray_may_be_in_a_zone_by_that_much_but_not_more(floor_m: float
 
 
 @pytest.mark.parametrize(
+    ("out_m", "is_sound"),
+    [pytest.param(91.0, True, id="stops before"), pytest.param(80.0, False, id="was outside")],
+)
+def test_who_is_astray_near_the_border_has_left_a_zone_when_it_is_outside_by_all(
+    out_m: float, is_sound: bool
+) -> None:
+    world = on_a_way((0, 100, 0), (25, 100, 0), (25.5, out_m, 0), (25.7, 95, 0), (25.9, 85, 0))
+    complaints = FieldJudge(world, astray_m=3.0).complaints([DRAWN])
+
+    assert [each for each, _ in complaints] == ([] if is_sound else ["in a zone"])
+
+
+@pytest.mark.parametrize(
     ("out_s", "uav", "flaws", "is_sound"),
     [
         pytest.param(1.0, {}, (), True, id="at full speed"),
