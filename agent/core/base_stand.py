@@ -27,7 +27,7 @@ class BaseStand:
     def wait(self, claim: Claim | None) -> None:
         """It waits for its way up, perhaps at a base, by its own last word."""
         stands = claim is not None and claim.stage in (BaseStage.LANDED, BaseStage.PARKED)
-        if self._at is None and stands and claim is not None and claim.base and claim.stage:
+        if stands and claim is not None and claim.base and claim.stage:
             self._at = claim.base, claim.stage
 
     def leave(self) -> None:

@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sim.faults.drawn_zones import DrawnZone
+from sim.world.base_places import base_at
 from sim.world.flight_log import LastSeen
 from sim.world.flown_path import MotionPiece
 from sim.world.motion import Point, flown_s
@@ -41,7 +42,6 @@ _CHORDS = 8
 _SLACK_M = 1e-3
 _MARGIN_SLACK_FRAC = 1e-3
 """Chains of chords in the place of round corners."""
-_SAME_BASE_M = 1.0
 _LOW_M = 0.5
 """Who is no lower than that is on the ground."""
 
@@ -422,7 +422,5 @@ class Chances:
         return np.maximum(legs_s, self._problem.legs_from_s(row, (east_m, north_m, 0.0)))
 
     def _base_at(self, seen: LastSeen) -> int | None:
-        for number, base in enumerate(self._mission.bases):
-            if math.dist(base.position_enu_m[:2], seen.place_enu_m[:2]) <= _SAME_BASE_M:
-                return number
-        return None
+        base = base_at(self._mission.bases, seen.place_enu_m)
+        return None if base is None else self._mission.bases.index(base)

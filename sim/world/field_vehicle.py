@@ -29,6 +29,7 @@ from agent.core.interface import (
     VehicleReport,
     VehicleWord,
 )
+from sim.world.base_places import SAME_PLACE_M, base_at
 from sim.world.battery import FlightBattery
 from sim.world.engine import EventQueue
 from sim.world.field_paths import FieldPaths
@@ -42,7 +43,6 @@ from swarm.model import Mission
 _AT_REST: Point = (0.0, 0.0, 0.0)
 _ABOVE_M = 0.5
 """Who is nearer than that to a place, seen from above, is there [m]."""
-_SAME_BASE_M = 1.0
 _MOMENT_S = 0.5
 """Its agent knows where it was so long ago, or later, and tells it to stop there [s]."""
 _TOLERANCE_S = 1e-6
@@ -234,10 +234,10 @@ class FieldVehicle(TracedVehicle):
     def _ground_below(self, place_enu_m: Point) -> Point:
         """Where it lands from there, which over a base or its start may be in any layer."""
         east_m, north_m, up_m = place_enu_m
-        known = [base.position_enu_m for base in self._paths.mission.bases]
-        for there in (*known, self._start_enu_m):
-            if math.dist(there[:2], place_enu_m[:2]) <= _SAME_BASE_M:
-                return east_m, north_m, there[2]
+        if (base := base_at(self._paths.mission.bases, place_enu_m)) is not None:
+            return east_m, north_m, base.position_enu_m[2]
+        if math.dist(self._start_enu_m[:2], place_enu_m[:2]) <= SAME_PLACE_M:
+            return east_m, north_m, self._start_enu_m[2]
         return east_m, north_m, up_m - self._layer_m
 
     # -- motion -------------------------------------------------------------------------
@@ -362,10 +362,8 @@ class FieldVehicle(TracedVehicle):
 
     def _base_swap_s(self, place_enu_m: Point) -> float | None:
         """How long a battery takes to be changed there [s]; None: there is no base."""
-        for base in self._paths.mission.bases:
-            if math.dist(base.position_enu_m[:2], place_enu_m[:2]) <= _SAME_BASE_M:
-                return base.swap_s
-        return None
+        base = base_at(self._paths.mission.bases, place_enu_m)
+        return None if base is None else base.swap_s
 
     def _refuse(self, order: VehicleOrder, reason: str) -> None:
         self._queue.after(0.0, lambda: self._report(Refused(order, reason)))

@@ -25,13 +25,13 @@ from agent.core.interface import (
     VehicleReport,
     VehicleWord,
 )
+from sim.world.base_places import base_at
 from sim.world.motion import Point
 from sim.world.track import Track
 from swarm.model import BaseId, Mission, UavId
 from swarm.model.plan import START, ScheduleEntry, at_base
 from swarm.protocol.uav_messages import Outcome
 
-_SAME_BASE_M = 1.0
 _HELD_UP_S = 1.0
 """Whose agent says that an attempt ended longer ago than that, it hung: no clock is so far off."""
 
@@ -315,10 +315,8 @@ class FlightLog:
         return min(ends_s, default=leg.depart_s)
 
     def _base_at(self, place_enu_m: Point) -> BaseId | None:
-        for base in self._mission.bases:
-            if math.dist(base.position_enu_m[:2], place_enu_m[:2]) <= _SAME_BASE_M:
-                return base.id
-        return None
+        base = base_at(self._mission.bases, place_enu_m)
+        return None if base is None else base.id
 
 
 def _entry(leg: _OpenLeg, end_s: float) -> ScheduleEntry:

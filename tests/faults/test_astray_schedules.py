@@ -41,6 +41,10 @@ BROKEN_ONCE = {
     21000517: "who set off from a task's own height was led twice as high if it turned at once",
     22001564: "who was sent home before its mission began waited until its battery was empty",
     22006210: "who was begun anew, and knew of no mission, waited for its way home for ever",
+    29000688: "two bases less than a metre apart were one to the log of flights",
+    29001620: "the judge took who was astray near the border of a new zone to have left it",
+    27000101: "who had left its slot told so, and then that it held it all along",
+    29003951: "who had left its slot to others told that it held it when it asked for its way up",
     28003719: "who waited for its way and was begun anew took it for its own",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
