@@ -10,7 +10,7 @@ from agent.core.base_stand import BaseStand
 from swarm.protocol.uav_messages import BaseStage, Claim, ClaimPhase
 
 STANDS = Claim(ClaimPhase.HELD, None, 40.0, 0, 70.0, base="b0", stage=BaseStage.LANDED)
-DECIDED = Claim(ClaimPhase.PROPOSED, "t0", 70.0, 1, 90.0, departs_s=75.0)
+DECIDED = Claim(ClaimPhase.PROPOSED, "t0", 70.0, 1, 90.0)
 
 
 @pytest.mark.parametrize("stage", [BaseStage.LANDED, BaseStage.PARKED])
