@@ -22,6 +22,7 @@ from sim.fleet.layout import (
     Layout,
     agent_groups,
     autopilot_groups,
+    uavs_by_height,
 )
 from sim.fleet.start_pace import AT_ONCE_PER_CORE, StartPace
 from swarm.model import Mission
@@ -118,8 +119,8 @@ class Launcher:
                 vehicles = _there(places)
         await self._start(COORDINATOR, layout.coordinator())
         there = {place.uav: place async for place in vehicles}
-        in_order = [there[uav.id] for uav in self.mission.uavs if uav.id in there]
-        for group in agent_groups(in_order, self.options):
+        rising = [there[uav] for uav in uavs_by_height(self.mission, self.options) if uav in there]
+        for group in agent_groups(rising, self.options):
             await self._pace.room()
             uavs = [place.uav for place in group]
             name = uavs[0] if len(uavs) == 1 else f"agents of {uavs[0]} and {len(uavs) - 1} more"

@@ -25,11 +25,12 @@ from swarm.bus.config import BusConfig, ClientTopology, MeshTopology, Topology, 
 from swarm.bus.local_runs import LocalRun, begun
 from swarm.bus.loopback import free_loopback_endpoints
 from swarm.identity import load_identity
-from swarm.model import Mission
+from swarm.model import Mission, UavId
 from swarm.model.ids import COORDINATOR
 from swarm.model.layers import HIGHEST_M, FlightLayers, layers_below, layers_over
 from swarm.protocol.timing import PRESETS, UNSTRETCHED_UAVS, LinkKind, LinkPreset, Timing, preset
 from swarm.runtime.log import LogFormat
+from swarm.separation.fleet_layers import fleet_layers_m
 
 _Member = TypeVar("_Member")
 AUTO_MESH_LIMIT = 16
@@ -409,13 +410,20 @@ def autopilot_groups(uavs: Sequence[str]) -> list[list[str]]:
     return _in_turn(uavs, size)
 
 
+def uavs_by_height(mission: Mission, options: LaunchOptions) -> list[UavId]:
+    """All UAVs, from the one that begins the mission lowest above the ground."""
+    heights_m = fleet_layers_m(mission, flight_layers(mission, options))
+    rising = sorted(zip(heights_m, mission.uavs, strict=True), key=lambda each: each[0])
+    return [uav.id for _, uav in rising]
+
+
 def agent_groups(
     places: Sequence[VehiclePlace], options: LaunchOptions
 ) -> list[list[VehiclePlace]]:
     """UAVs whose agents share a process, of those that are told the same, as they are to start.
 
-    Whoever comes later in a mission flies higher, and climbs for longer. So the last start first,
-    in all processes: agents of one begin one after the other.
+    Whoever begins higher climbs for longer. So the last of ``places``, which rise, start first, in
+    all processes: agents of one begin one after the other.
     """
     rank = {place.uav: number for number, place in enumerate(places)}
     alike: dict[tuple[str, ...], list[VehiclePlace]] = {}

@@ -14,6 +14,7 @@ import pytest
 
 from agent.vehicle.config import CommandStyle
 from coordinator.dashboard.access import ServeAddress
+from sim.bench.fleets import survey_mission
 from sim.fleet.autopilots import RunningVehicles, SimulatedAutopilots, VehiclePlace
 from sim.fleet.keys import RunKeys
 from sim.fleet.layout import (
@@ -29,12 +30,14 @@ from sim.fleet.layout import (
     default_position_rate_hz,
     defaults_for,
     flight_layers,
+    uavs_by_height,
 )
 from sim.fleet.passthrough import PassthroughOptions
 from swarm.bus.config import ClientTopology, MeshTopology
 from swarm.model.ids import COORDINATOR
 from swarm.model.layers import FlightLayers
 from swarm.protocol.timing import LinkKind
+from swarm.separation.fleet_layers import fleet_layers_m
 from tests.support.builders import MISSION, mission, task, uav
 
 OPTIONS = LaunchOptions(
@@ -190,6 +193,19 @@ def test_those_that_are_told_the_same_share_a_process_and_the_highest_start_firs
     assert groups(OPTIONS) == ["u6", "u5", "u4", "u3", "u2", "u1", "u0"]
     assert groups(sharing) == ["u6 u3 u0", "u5 u2", "u4 u1"]
     assert groups(replace(sharing, passthrough=other)) == ["u6 u4 u1", "u5 u2 u0", "u3"]
+
+
+def test_who_begins_highest_starts_first_wherever_it_is_in_the_mission() -> None:
+    """In layers that all share neighbours begin apart, whoever they are."""
+    own = survey_mission(30, 60, 0)
+    shared = survey_mission(30, 60, 0, separation_m=6.0)
+    assert uavs_by_height(own, OPTIONS) == [uav.id for uav in own.uavs]
+
+    heights_m = dict(zip((uav.id for uav in shared.uavs), fleet_layers_m(shared), strict=True))
+    rising = [heights_m[uav] for uav in uavs_by_height(shared, OPTIONS)]
+    assert len(rising) == 30
+    assert rising == sorted(rising)
+    assert rising[0] < rising[-1]
 
 
 def test_a_process_of_several_agents_is_told_of_each() -> None:
