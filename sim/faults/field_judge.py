@@ -271,10 +271,8 @@ def _chords_in(
             continue
         for begin_s, (one, other) in zip(instants_s, pairwise(places), strict=False):
             flat = one[:2], other[:2]
-            yield (
-                begin_s,
-                shapely.Point(flat[0]) if flat[0] == flat[1] else shapely.LineString(flat),
-            )
+            chord = shapely.Point(flat[0]) if flat[0] == flat[1] else shapely.LineString(flat)
+            yield begin_s, chord
 
 
 def _chords(piece: MotionPiece) -> tuple[list[float], list[Point]]:
