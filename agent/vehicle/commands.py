@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections import deque
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from enum import Enum, IntEnum
 
@@ -100,6 +101,9 @@ class _Pending:
     tag: str
     serial: int
     message: VehicleCommand
+    renewed: Callable[[], VehicleCommand | None] | None = None
+    """Makes what is sent in its place when it is sent again; None: it stays as it is."""
+    sent: bool = False
     silent_tries: int = 0
     """Transmissions since the last answer."""
     busy_answers: int = 0
@@ -127,14 +131,23 @@ class CommandQueue:
         self.stray_acks = 0
         """Acknowledgements that belonged to nothing in flight."""
 
-    def send(self, tag: str, message: VehicleCommand, now_s: float) -> list[VehicleCommand]:
+    def send(
+        self,
+        tag: str,
+        message: VehicleCommand,
+        now_s: float,
+        renewed: Callable[[], VehicleCommand | None] | None = None,
+    ) -> list[VehicleCommand]:
         """Take care of ``message``; a pending one of the same tag is superseded.
+
+        When it is to be sent again ``renewed`` makes what is sent in its place, of the same
+        number; without that, or where that gives None, it stays as it is.
 
         Returns:
             What to transmit now; empty if another command of the number is in flight.
         """
         self._serial += 1
-        pending = _Pending(tag, self._serial, message)
+        pending = _Pending(tag, self._serial, message, renewed)
         line = self._lines.setdefault(message.command, deque())
         for place, other in enumerate(line):
             if other.tag == tag:
@@ -206,6 +219,9 @@ class CommandQueue:
         return min((line[0].deadline_s for line in self._lines.values() if line), default=None)
 
     def _transmit(self, pending: _Pending, now_s: float) -> list[VehicleCommand]:
+        if pending.sent and pending.renewed is not None:
+            pending.message = pending.renewed() or pending.message
+        pending.sent = True
         message = pending.message
         if isinstance(message, CommandLong) and pending.silent_tries:
             message = replace(message, confirmation=min(pending.silent_tries, 255))
@@ -278,14 +294,19 @@ class RepeatedCommand:
         """Give the vehicle its time."""
         self._next_s = now_s + (self._retry_delay_s if self.refused else self._effect_timeout_s)
 
-    def give(self, message: VehicleCommand, now_s: float) -> list[VehicleCommand] | None:
-        """What to transmit now; None if it was given often enough."""
+    def give(
+        self,
+        message: VehicleCommand,
+        now_s: float,
+        renewed: Callable[[], VehicleCommand | None] | None = None,
+    ) -> list[VehicleCommand] | None:
+        """What to transmit now; None if it was given often enough. See `CommandQueue.send`."""
         if self._commands.pending(self._tag) or now_s < self._next_s:
             return []
         if self.given >= self._tries:
             return None
         self.given += 1
-        return self._commands.send(self._tag, message, now_s)
+        return self._commands.send(self._tag, message, now_s, renewed)
 
     def cancel(self, now_s: float) -> list[VehicleCommand]:
         """Its effect is seen."""

@@ -139,28 +139,41 @@ class Holding(Activity):
         else:
             self._guided_seen = True
             if self._stop_message is None:
-                self._stop_message = self._firmware.pause() or self._stay()
+                self._stop_message = self._still()
             if self._stop_message is not None:
-                self._tell(self._stop, self._stop_message)
+                self._tell(self._stop, self._stop_message, self._still)
+            else:
+                self._miss_place()
 
-    def _stay(self) -> VehicleCommand | None:
-        """A target where the vehicle can stop: it comes back to one that is nearer.
+    def _still(self) -> VehicleCommand | None:
+        """What stops it: a pause, or a target where it can stop, as it comes back to a nearer one.
 
         None while it is not known where it is.
         """
         session, config = self._session, self._session.config
+        if (pause := self._firmware.pause()) is not None:
+            return pause
         place_enu_m = session.stops_at_m()
-        if place_enu_m is not None:
-            place = wgs84_from_enu(config.origin, config.within_fence(place_enu_m))
-            return self._firmware.reposition(*place, session.cruise_speed_m_s)
+        if place_enu_m is None:
+            return None
+        place = wgs84_from_enu(config.origin, config.within_fence(place_enu_m))
+        return self._firmware.reposition(*place, session.cruise_speed_m_s)
+
+    def _miss_place(self) -> None:
+        """It is not known where it is: wait for that, but not for long."""
+        session = self._session
         if self._lost_since_s is None:
             self._lost_since_s = session.now_s
-        elif session.now_s - self._lost_since_s >= config.position_timeout_s:
+        elif session.now_s - self._lost_since_s >= session.config.position_timeout_s:
             self.failure = "the places that it tells are too far apart to stop it at one"
-        return None
 
-    def _tell(self, command: RepeatedCommand, message: VehicleCommand) -> None:
-        out = command.give(message, self._session.now_s)
+    def _tell(
+        self,
+        command: RepeatedCommand,
+        message: VehicleCommand,
+        renewed: Callable[[], VehicleCommand | None] | None = None,
+    ) -> None:
+        out = command.give(message, self._session.now_s, renewed)
         if out is None:
             why = f": {result_text(command.result)}" if command.refused else ""
             self.failure = f"the vehicle was told to stop {command.given} times and goes on{why}"

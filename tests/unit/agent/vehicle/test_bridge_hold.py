@@ -346,6 +346,29 @@ def test_vehicle_is_told_to_stop_where_it_can_and_comes_back_to_nowhere() -> Non
     assert hovers(flight)
 
 
+def test_a_stop_that_was_lost_names_where_it_can_stop_by_then() -> None:
+    """It has flown on meanwhile, past where it could have stopped."""
+    flight = by_targets(FakeCopter)
+    flight.copter.heard.clear()
+    flight.copter.verdicts = {REPOSITION: [None, None]}
+    turned_back = False
+    flight.order(HOLD)
+    for _ in range(200):
+        flight.run(0.1)
+        turned_back |= flight.copter.velocity_m_s[0] < -0.5
+    told_m = [
+        enu_from_wgs84(ORIGIN, m.x / 1e7, m.y / 1e7, m.z)[0]
+        for m in flight.copter.commands(REPOSITION)
+        if m.get_type() == "COMMAND_INT"
+    ]
+
+    assert len(told_m) == 3
+    assert told_m == sorted(told_m)
+    assert told_m[-1] > told_m[0] + 5.0
+    assert not turned_back
+    assert hovers(flight)
+
+
 def test_while_what_it_tells_last_does_not_count_it_is_told_the_place_before() -> None:
     """Its velocity came with a place that nothing bears out."""
     flight = by_targets(FakeCopter)

@@ -53,6 +53,23 @@ def test_unanswered_command_is_sent_again_with_a_confirmation_and_then_given_up(
     assert not commands.pending("arm")
 
 
+@pytest.mark.parametrize("busy", [False, True])
+def test_what_is_sent_again_is_made_anew_if_that_is_wished(busy: bool) -> None:
+    commands = machine()
+    later = deque([replace(TARGET, lat_deg=47.1), None, replace(TARGET, lat_deg=47.2)])
+    sent = commands.send("stop", TARGET, 0.0, later.popleft)
+    for at_s in (1.0, 2.0):
+        if busy:
+            commands.on_ack(CommandAck(TARGET.command, BUSY), at_s - 0.5)
+        sent += commands.on_time(at_s)[0]
+
+    assert [message.lat_deg for message in sent if isinstance(message, CommandInt)] == [
+        47.0,
+        47.1,
+        47.1,
+    ]
+
+
 def test_busy_vehicle_is_asked_again_later_but_not_for_ever() -> None:
     commands = machine()
     commands.send("arm", ARM, 0.0)
