@@ -272,7 +272,7 @@ class AgentCore(AgentPart):
         match event:
             case MessageReceived() | MessagesReceived():
                 for message in event.messages:
-                    self._sync.hear(message, now_s, event.waited_s)
+                    self._sync.hear(message, now_s, event.arrived_s)
             case SnapshotsReceived(snapshots):
                 self._learn(snapshots, now_s)
             case PeerSeen(writer):

@@ -68,8 +68,8 @@ class StateSync(AgentPart):
 
     # -- what is said -----------------------------------------------------------------
 
-    def hear(self, message: Message, now_s: float, waited_s: float = 0.0) -> None:
-        """Somebody has just said so; it may have ``waited_s`` in this process to be heard [s]."""
+    def hear(self, message: Message, now_s: float, arrived_s: float | None = None) -> None:
+        """Somebody says so; it came into this process just now, or at ``arrived_s``."""
         writer, body = message.writer, message.body
         if writer == self._uav:
             if self._announcer.is_foreign(message):
@@ -90,7 +90,7 @@ class StateSync(AgentPart):
         # What was said before tells what time it is only to whom nothing else does.
         is_word = self._replica.epoch_stamp != known or not self._mission_view.clock.is_set
         if is_word and isinstance(body, PlanEpoch) and body.phase is MissionPhase.RUNNING:
-            self._set_clock(body.mission_s + waited_s, now_s)
+            self._set_clock(body.mission_s, now_s if arrived_s is None else arrived_s, now_s)
 
     def without_repeated(
         self, event: MessageReceived | MessagesReceived, now_s: float
@@ -111,7 +111,7 @@ class StateSync(AgentPart):
                 self._peers.heard(message, self._replica, now_s)
             else:
                 news.append(message)
-        return MessagesReceived(tuple(news), event.waited_s)
+        return MessagesReceived(tuple(news), event.arrived_s)
 
     def learn(self, snapshots: Sequence[Snapshot], now_s: float) -> None:
         """The answers to a question."""
@@ -241,10 +241,10 @@ class StateSync(AgentPart):
         """Whose claim is known by hearsay must speak: it may hang since, with a living token."""
         self._peers.membership.expect(self._replica.claims.keys() - {self._uav}, now_s)
 
-    def _set_clock(self, mission_s: float, now_s: float) -> None:
-        """The coordinator has just said that it is ``mission_s``."""
+    def _set_clock(self, mission_s: float, said_s: float, now_s: float) -> None:
+        """The coordinator has said at ``said_s`` or before that it is ``mission_s``."""
         clock = self._mission_view.clock
-        was_set, change_s = clock.is_set, clock.hear(mission_s, now_s)
+        was_set, change_s = clock.is_set, clock.hear(mission_s, said_s)
         if not was_set:
             self._awake(now_s)
             self._log("mission runs", mission_s=mission_s)

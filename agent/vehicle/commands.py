@@ -279,6 +279,8 @@ class RepeatedCommand:
         """How often it was given."""
         self.refused = False
         """The last was not accepted."""
+        self.accepted = False
+        """The last was accepted."""
         self.result: int | None = None
         """MAV_RESULT of the last; None without an acknowledgement."""
 
@@ -286,7 +288,8 @@ class RepeatedCommand:
         """Take the outcome of a command; whether it is an acceptance of this one."""
         if ended.tag != self._tag or not self.given:
             return False
-        self.refused, self.result = ended.ending is not CommandOutcome.ACCEPTED, ended.result
+        self.accepted, self.result = ended.ending is CommandOutcome.ACCEPTED, ended.result
+        self.refused = not self.accepted
         self.wait(now_s)
         return not self.refused
 
@@ -294,19 +297,27 @@ class RepeatedCommand:
         """Give the vehicle its time."""
         self._next_s = now_s + (self._retry_delay_s if self.refused else self._effect_timeout_s)
 
-    def give(
-        self,
-        message: VehicleCommand,
-        now_s: float,
-        renewed: Callable[[], VehicleCommand | None] | None = None,
+    def give(self, message: VehicleCommand, now_s: float) -> list[VehicleCommand] | None:
+        """What to transmit now; None if it was given often enough."""
+        return self.give_made(lambda: message, now_s)
+
+    def give_made(
+        self, make: Callable[[], VehicleCommand | None], now_s: float
     ) -> list[VehicleCommand] | None:
-        """What to transmit now; None if it was given often enough. See `CommandQueue.send`."""
+        """The same of what ``make`` gives, each time that it is sent; nothing while that is None.
+
+        All that it gives is of one number.
+        """
         if self._commands.pending(self._tag) or now_s < self._next_s:
             return []
         if self.given >= self._tries:
             return None
+        message = make()
+        if message is None:
+            return []
         self.given += 1
-        return self._commands.send(self._tag, message, now_s, renewed)
+        self.accepted = False
+        return self._commands.send(self._tag, message, now_s, make)
 
     def cancel(self, now_s: float) -> list[VehicleCommand]:
         """Its effect is seen."""

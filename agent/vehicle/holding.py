@@ -71,7 +71,7 @@ class Holding(Activity):
         self._disarm = session.repeated("disarm", tries)
         self._stop = session.repeated(TARGET_TAG, tries)
         self._stop_message: VehicleCommand | None = None
-        """What stops it in the guided mode, once known."""
+        """What it was told last to stop in the guided mode."""
         self._lost_since_s: float | None = None
         self._told = False
         """The vehicle has taken the place to hover at, or was taken out of another mode."""
@@ -138,26 +138,24 @@ class Holding(Activity):
             self._tell(self._mode, self._firmware.set_commanded_mode())
         else:
             self._guided_seen = True
-            if self._stop_message is None:
-                self._stop_message = self._still()
-            if self._stop_message is not None:
-                self._tell(self._stop, self._stop_message, self._still)
-            else:
+            self._say(self._stop, self._stop.give_made(self._still, self._session.now_s))
+            if self._stop_message is None and self._session.stops_at_m() is None:
                 self._miss_place()
 
     def _still(self) -> VehicleCommand | None:
         """What stops it: a pause, or a target where it can stop, as it comes back to a nearer one.
 
-        None while it is not known where it is.
+        The one that it took, if it did. None as long as it is not known where it is.
         """
         session, config = self._session, self._session.config
+        if self._stop.accepted:
+            return self._stop_message
         if (pause := self._firmware.pause()) is not None:
-            return pause
-        place_enu_m = session.stops_at_m()
-        if place_enu_m is None:
-            return None
-        place = wgs84_from_enu(config.origin, config.within_fence(place_enu_m))
-        return self._firmware.reposition(*place, session.cruise_speed_m_s)
+            self._stop_message = pause
+        elif (place_enu_m := session.stops_at_m()) is not None:
+            place = wgs84_from_enu(config.origin, config.within_fence(place_enu_m))
+            self._stop_message = self._firmware.reposition(*place, session.cruise_speed_m_s)
+        return self._stop_message
 
     def _miss_place(self) -> None:
         """It is not known where it is: wait for that, but not for long."""
@@ -167,13 +165,11 @@ class Holding(Activity):
         elif session.now_s - self._lost_since_s >= session.config.position_timeout_s:
             self.failure = "the places that it tells are too far apart to stop it at one"
 
-    def _tell(
-        self,
-        command: RepeatedCommand,
-        message: VehicleCommand,
-        renewed: Callable[[], VehicleCommand | None] | None = None,
-    ) -> None:
-        out = command.give(message, self._session.now_s, renewed)
+    def _tell(self, command: RepeatedCommand, message: VehicleCommand) -> None:
+        self._say(command, command.give(message, self._session.now_s))
+
+    def _say(self, command: RepeatedCommand, out: list[VehicleCommand] | None) -> None:
+        """What is to be sent of a command; None: it was given often enough."""
         if out is None:
             why = f": {result_text(command.result)}" if command.refused else ""
             self.failure = f"the vehicle was told to stop {command.given} times and goes on{why}"

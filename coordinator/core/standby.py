@@ -147,7 +147,7 @@ class StandbyCore:
             case MessageReceived() | MessagesReceived():
                 for message in event.messages:
                     self._membership.heard(message.writer, now_s)
-                    self._take_in(message, now_s - event.waited_s)
+                    self._take_in(message, now_s if event.arrived_s is None else event.arrived_s)
             case SnapshotsReceived(snapshots):
                 self._state_query.answered()
                 for snapshot in snapshots:

@@ -156,7 +156,7 @@ class MissionState:
                     ask |= self._welcome_back(message.writer, now_s)
                 if message.writer == COORDINATOR:
                     self._hear_coordinator(message, now_s)
-                self.take_note(message, now_s, fact.waited_s)
+                self.take_note(message, now_s, fact.arrived_s)
                 ask |= self._names_unknown(message.body)
             case SnapshotsReceived(snapshots):
                 self._asking.answered()
@@ -342,11 +342,8 @@ class MissionState:
 
     # -- what was said ------------------------------------------------------------------
 
-    def take_note(self, message: Message, now_s: float, waited_s: float = 0.0) -> None:
-        """Take in what somebody says, be it this very process.
-
-        It may have ``waited_s`` in this process to be heard [s].
-        """
+    def take_note(self, message: Message, now_s: float, arrived_s: float | None = None) -> None:
+        """Take in what somebody says, be it this very process; it came now, or at ``arrived_s``."""
         writer = message.writer
         if isinstance(message.body, Status):
             before = self.statuses.get(writer)
@@ -369,7 +366,7 @@ class MissionState:
         self.flights.hear(writer, message.body, self.mission_s(now_s))
         match message.body:
             case PlanEpoch() as epoch:
-                self._hear_epoch(epoch, now_s, now_s - waited_s)
+                self._hear_epoch(epoch, now_s, now_s if arrived_s is None else arrived_s)
             case Outcome() as outcome if earlier is not None:
                 if not self._is_another_visit(outcome, earlier):
                     return

@@ -137,25 +137,25 @@ class FieldJudge:
         margin_m = self.world.mission.zone_margin_m
         speeds_m_s = {str(uav.id): uav.speed_m_s for uav in self.world.mission.uavs}
         for drawn in zones:
+            whole = _forbidden(drawn.zone, margin_m, 0.0)
             for uav, track in self.world.tracks.items():
                 beside_m = self.astray_m + self.stale_s * speeds_m_s[uav]
                 forbidden = _forbidden(drawn.zone, margin_m, beside_m)
-                whole = _forbidden(drawn.zone, margin_m, 0.0)
                 since_s = drawn.heeded_by_s(uav, self.reaction_s)
                 if since_s == math.inf:
                     continue
-                leaves_s = self._leaves_s(uav, since_s, forbidden) if drawn.since_s > 0.0 else 0.0
+                leaves_s = self._leaves_s(uav, since_s, whole) if drawn.since_s > 0.0 else 0.0
                 outside, cut_s = leaves_s == 0.0, min(max(since_s, leaves_s), drawn.until_s)
                 pieces = [*track.pieces(since_s, cut_s), *track.pieces(cut_s, drawn.until_s)]
-                for begin_s, place in _chords_in(pieces, drawn.zone, self.astray_m):
-                    enters = place is not None and bool(shapely.intersects(forbidden, place))
+                for begin_s, chord, deep in _chords_in(pieces, drawn.zone, self.astray_m):
+                    enters = deep and bool(shapely.intersects(forbidden, chord))
                     # Who is astray by what is forgiven has not left yet.
-                    outside = outside or place is None or not shapely.intersects(whole, place)
+                    outside = outside or chord is None or not shapely.intersects(whole, chord)
                     if enters and (outside or begin_s >= leaves_s):
                         yield f"{uav} in {drawn.zone.id} at {begin_s:.3f} s"
                         break
 
-    def _leaves_s(self, uav: str, since_s: float, forbidden: shapely.Geometry) -> float:
+    def _leaves_s(self, uav: str, since_s: float, whole: shapely.Geometry) -> float:
         """By when it must have left what has been drawn over it [s]; 0 if it is outside.
 
         At ``since_s`` its way out is ordered at the latest, wherever it was going. With the speed
@@ -166,7 +166,7 @@ class FieldJudge:
         import shapely
 
         place = self.world.tracks[uav].position_enu_m(since_s)
-        if place is None or not shapely.intersects(forbidden, shapely.Point(place[:2])):
+        if place is None or not shapely.intersects(whole, shapely.Point(place[:2])):
             return 0.0
         row = next(each for each in self.world.mission.uavs if each.id == uav)
         speed_m_s, a_m_s2 = row.speed_m_s, row.acceleration_m_s2
@@ -174,8 +174,8 @@ class FieldJudge:
             against_m_s = row.airspeed_m_s - math.hypot(*self.world.mission.wind_enu_m_s)
             speed_m_s = min(speed_m_s, against_m_s)
         stops_s = 0.0 if a_m_s2 is None else row.speed_m_s / a_m_s2
-        out_m = float(shapely.distance(shapely.boundary(forbidden), shapely.Point(place[:2])))
-        out_m += row.speed_m_s * (stops_s / 2.0 + self.stale_s) + self.astray_m
+        out_m = float(shapely.distance(shapely.boundary(whole), shapely.Point(place[:2])))
+        out_m += row.speed_m_s * stops_s / 2.0
         waits_s = 0.0
         if self.world.mission.separation_m is not None:
             waits_s, out_m = _GRANTED_S, out_m + _layers_apart_m(self.world.mission)
@@ -256,23 +256,24 @@ def _forbidden(zone: Zone, margin_m: float, astray_m: float) -> shapely.Geometry
 
 def _chords_in(
     pieces: Iterable[MotionPiece], zone: Zone, astray_m: float
-) -> Iterator[tuple[float, shapely.Geometry | None]]:
+) -> Iterator[tuple[float, shapely.Geometry | None, bool]]:
     """When each chord of a flight begins [s], and what of it is at the heights of a zone.
 
-    That is so where it is farther than ``astray_m`` from floor and ceiling; else None.
+    None: it is above or below. And whether it is farther than ``astray_m`` from floor and ceiling.
     """
     import shapely
 
     for piece in pieces:
         instants_s, places = _chords(piece)
         heights_m = [up_m for _, _, up_m in places]
-        if not zone.concerns(min(heights_m) + astray_m, max(heights_m) - astray_m):
-            yield piece.begin_s, None
+        if not zone.concerns(min(heights_m), max(heights_m)):
+            yield piece.begin_s, None, False
             continue
+        deep = zone.concerns(min(heights_m) + astray_m, max(heights_m) - astray_m)
         for begin_s, (one, other) in zip(instants_s, pairwise(places), strict=False):
             flat = one[:2], other[:2]
             chord = shapely.Point(flat[0]) if flat[0] == flat[1] else shapely.LineString(flat)
-            yield begin_s, chord
+            yield begin_s, chord, deep
 
 
 def _chords(piece: MotionPiece) -> tuple[list[float], list[Point]]:

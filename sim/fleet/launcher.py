@@ -22,7 +22,6 @@ from sim.fleet.layout import (
     Layout,
     agent_groups,
     autopilot_groups,
-    uavs_by_height,
 )
 from sim.fleet.start_pace import AT_ONCE_PER_CORE, StartPace
 from swarm.model import Mission
@@ -118,9 +117,8 @@ class Launcher:
             case RunningVehicles(places):
                 vehicles = _there(places)
         await self._start(COORDINATOR, layout.coordinator())
-        there = {place.uav: place async for place in vehicles}
-        rising = [there[uav] for uav in uavs_by_height(self.mission, self.options) if uav in there]
-        for group in agent_groups(rising, self.options):
+        there = [place async for place in vehicles]
+        for group in agent_groups(there, self.mission, self.options):
             await self._pace.room()
             uavs = [place.uav for place in group]
             name = uavs[0] if len(uavs) == 1 else f"agents of {uavs[0]} and {len(uavs) - 1} more"

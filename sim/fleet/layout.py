@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 from pathlib import Path
@@ -418,21 +418,21 @@ def uavs_by_height(mission: Mission, options: LaunchOptions) -> list[UavId]:
 
 
 def agent_groups(
-    places: Sequence[VehiclePlace], options: LaunchOptions
+    places: Iterable[VehiclePlace], mission: Mission, options: LaunchOptions
 ) -> list[list[VehiclePlace]]:
     """UAVs whose agents share a process, of those that are told the same, as they are to start.
 
-    Whoever begins higher climbs for longer. So the last of ``places``, which rise, start first, in
-    all processes: agents of one begin one after the other.
+    Whoever begins higher climbs for longer. So the highest start first, in all processes: agents of
+    one begin one after the other.
     """
-    rank = {place.uav: number for number, place in enumerate(places)}
+    rank = {uav: number for number, uav in enumerate(uavs_by_height(mission, options))}
     alike: dict[tuple[str, ...], list[VehiclePlace]] = {}
-    for place in reversed(places):
+    for place in sorted(places, key=lambda place: -rank[UavId(place.uav)]):
         alike.setdefault(tuple(options.passthrough.to_agent(place.uav)), []).append(place)
     groups = [
         group for same in alike.values() for group in _in_turn(same, options.agents_per_process)
     ]
-    return sorted(groups, key=lambda group: -rank[group[0].uav])
+    return sorted(groups, key=lambda group: -rank[UavId(group[0].uav)])
 
 
 def _in_turn(members: Sequence[_Member], size: int) -> list[list[_Member]]:

@@ -14,8 +14,9 @@ class MessageReceived:
     """A checked message arrived while it was new."""
 
     message: Message
-    waited_s: float = field(default=0.0, compare=False)
-    """How long it has waited in this process to be heard [s of ``now_s``]."""
+    arrived_s: float | None = field(default=None, compare=False)
+    """When it came into this process [s of ``now_s``], where it may have waited for others; None:
+    now."""
 
     @property
     def messages(self) -> tuple[Message, ...]:
@@ -26,11 +27,13 @@ class MessageReceived:
 @dataclass(frozen=True, slots=True)
 class MessagesReceived:
     """Several that have waited for each other, in large fleets; cores that do not say so never
-    hear of it."""
+    hear of it.
+
+    None but the last may tell what time it is."""
 
     messages: tuple[Message, ...]
-    waited_s: float = field(default=0.0, compare=False)
-    """How long the last of them has waited in this process to be heard [s of ``now_s``]."""
+    arrived_s: float | None = field(default=None, compare=False)
+    """When the last of them came; see `MessageReceived`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -419,11 +419,10 @@ class Shell(Generic[E, A]):
                 if self._unread:  # the vehicle must not wait for a flood of words
                     await asyncio.sleep(0)
 
-    def _waited_s(self, sample: Sample) -> float:
-        """How long it has been here, behind what dozens of others of this process heard."""
-        if sample.arrived_s is None:
-            return 0.0
-        return elapsed_s(self._clock, max(0.0, self._loop.time() - sample.arrived_s))
+    def _arrived_s(self, sample: Sample) -> float:
+        """When it came, in the core's time; dozens of others of this process may have heard it."""
+        ago_s = 0.0 if sample.arrived_s is None else self._loop.time() - sample.arrived_s
+        return self._clock.now_s() - elapsed_s(self._clock, max(0.0, ago_s))
 
     def _read(self, most: int) -> None:
         """Let the core hear the oldest that it has not, so many at most."""
@@ -432,20 +431,20 @@ class Shell(Generic[E, A]):
             if isinstance(event, Sample):
                 message = self._message(event)
                 if message is not None and self._gathering is None:
-                    self.step(self._from_bus(MessageReceived(message, self._waited_s(event))))
+                    self.step(self._from_bus(MessageReceived(message, self._arrived_s(event))))
                 elif message is not None:
                     self._heard.append(message)
                     if event.key == self._keys.plan:  # by which the time of the mission is known
-                        self._tell_heard(self._waited_s(event))
+                        self._tell_heard(self._arrived_s(event))
             elif (fact := self._fact(event)) is not None:
                 self._tell_heard()
                 self.step(self._from_bus(fact))
         self._tell_heard()
 
-    def _tell_heard(self, last_waited_s: float = 0.0) -> None:
+    def _tell_heard(self, last_arrived_s: float | None = None) -> None:
         if self._heard and self._together is not None:
             heard, self._heard = self._heard, []
-            self._step(self._together(MessagesReceived(tuple(heard), last_waited_s)))
+            self._step(self._together(MessagesReceived(tuple(heard), last_arrived_s)))
 
     def _tell_newer(self) -> None:
         """Tell people once of each kind: it is no fault to be of another release."""

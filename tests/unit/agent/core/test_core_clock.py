@@ -9,7 +9,7 @@ from swarm.protocol.events import MessageReceived, MessagesReceived, SnapshotsRe
 from swarm.protocol.messages import MissionPhase, Snapshot
 from swarm.protocol.mission_clock import WORDS_KEPT
 from tests.support.builders import MISSION, entry, epoch, message, uav
-from tests.support.lone_agent import LoneAgent, notes, outcomes
+from tests.support.lone_agent import ZERO_S, LoneAgent, notes, outcomes
 
 
 def ready(*names: str) -> LoneAgent:
@@ -40,14 +40,14 @@ def test_an_agent_that_heard_of_the_start_late_is_put_right_by_the_next_announce
 def test_what_an_announcement_has_waited_in_this_process_makes_it_no_earlier() -> None:
     agent = ready()
     start = agent.statement(COORDINATOR, epoch("u0", mission_s=0.0))
-    agent.happen(MessageReceived(start, waited_s=0.75), 0.75)
+    agent.happen(MessageReceived(start, arrived_s=ZERO_S + 0.0), 0.75)
     assert mission_s(agent) == 0.75
 
     next_one = agent.statement(COORDINATOR, epoch("u0", mission_s=4.0))
-    agent.happen(MessagesReceived((next_one,), waited_s=0.5), 5.0)
+    agent.happen(MessagesReceived((next_one,), arrived_s=ZERO_S + 4.5), 5.0)
     assert mission_s(agent) == 5.0
     last = agent.statement(COORDINATOR, epoch("u0", mission_s=6.0))
-    agent.happen(MessagesReceived((last,), waited_s=0.5), 6.0)
+    agent.happen(MessagesReceived((last,), arrived_s=ZERO_S + 5.5), 6.0)
     assert mission_s(agent) == 6.5
 
 

@@ -346,26 +346,75 @@ def test_vehicle_is_told_to_stop_where_it_can_and_comes_back_to_nowhere() -> Non
     assert hovers(flight)
 
 
-def test_a_stop_that_was_lost_names_where_it_can_stop_by_then() -> None:
-    """It has flown on meanwhile, past where it could have stopped."""
-    flight = by_targets(FakeCopter)
-    flight.copter.heard.clear()
-    flight.copter.verdicts = {REPOSITION: [None, None]}
-    turned_back = False
+class BrakingCopter(FakeCopter):
+    """Speeds up and brakes as a vehicle does, towards a target."""
+
+    ACCELERATION_M_S2 = 2.5
+
+    def _move(self, dt_s: float) -> None:
+        target_m = self.target_m
+        guided = self.airborne and not self.in_takeoff and self.mode == self.own_mode
+        if not guided or target_m is None or dt_s <= 0.0:
+            super()._move(dt_s)
+            return
+        to_m = [there - here for here, there in zip(self.position_m, target_m, strict=True)]
+        away_m = math.hypot(*to_m)
+        if away_m < 0.05 and math.hypot(*self.velocity_m_s) < 0.3:
+            self.position_m, self.velocity_m_s = target_m, (0.0, 0.0, 0.0)
+            return
+        speed_m_s = min(self.speed_m_s, math.sqrt(2.0 * self.ACCELERATION_M_S2 * away_m))
+        wanted = [speed_m_s * each / max(away_m, 1e-9) for each in to_m]
+        change = [want - has for has, want in zip(self.velocity_m_s, wanted, strict=True)]
+        most = 1.2 * self.ACCELERATION_M_S2 * dt_s  # it can brake a little harder than it plans to
+        share = min(1.0, most / max(math.hypot(*change), 1e-9))
+        east, north, up = (
+            has + share * each for has, each in zip(self.velocity_m_s, change, strict=True)
+        )
+        self.velocity_m_s = east, north, up
+        x_m, y_m, z_m = self.position_m
+        self.position_m = x_m + east * dt_s, y_m + north * dt_s, z_m + up * dt_s
+
+
+@pytest.mark.parametrize("speed_m_s", [5.0, 14.0])
+@pytest.mark.parametrize(
+    "verdicts",
+    [
+        pytest.param([], id="heard"),
+        pytest.param([None], id="one lost"),
+        pytest.param([None, None], id="two lost"),
+        pytest.param([None] * 5, id="given up once"),
+        pytest.param([DENIED], id="denied"),
+        pytest.param([None, DENIED], id="one lost, one denied"),
+    ],
+)
+def test_no_stop_leads_back_however_late_it_is_heard(
+    verdicts: list[int | None], speed_m_s: float
+) -> None:
+    """It brakes for longer than its stop is waited for, and is told that again."""
+    copter = BrakingCopter(ORIGIN)
+    flight = BridgeFlight(copter, BridgeConfig(1, ORIGIN, fence_radius_m=2000.0))
+    flight.order(replace(START, speed_m_s=speed_m_s))
+    flight.run_until(VehicleReady())
+    flight.order(GoTo(1, (900.0, 0.0, 12.0)))
+    flight.run(14.0)
+    assert copter.velocity_m_s[0] > 0.9 * speed_m_s
+    copter.heard.clear()
+    copter.verdicts = {REPOSITION: list(verdicts)}
+    slowest_m_s = math.inf
     flight.order(HOLD)
-    for _ in range(200):
+    for _ in range(300):
         flight.run(0.1)
-        turned_back |= flight.copter.velocity_m_s[0] < -0.5
+        slowest_m_s = min(slowest_m_s, copter.velocity_m_s[0])
     told_m = [
         enu_from_wgs84(ORIGIN, m.x / 1e7, m.y / 1e7, m.z)[0]
-        for m in flight.copter.commands(REPOSITION)
+        for m in copter.commands(REPOSITION)
         if m.get_type() == "COMMAND_INT"
     ]
 
-    assert len(told_m) == 3
+    assert len(told_m) > len(verdicts)
     assert told_m == sorted(told_m)
-    assert told_m[-1] > told_m[0] + 5.0
-    assert not turned_back
+    assert slowest_m_s > -1.0
+    assert copter.position_m[0] == pytest.approx(told_m[-1], abs=0.1)
     assert hovers(flight)
 
 

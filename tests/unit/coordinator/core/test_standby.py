@@ -305,7 +305,7 @@ def test_mission_time_is_by_the_word_that_was_least_under_way() -> None:
     for counter, (at_s, delay_s, waited_s) in enumerate(words, 100):
         watcher.now_s = 98.0 + at_s + delay_s
         said = message(COORDINATOR, epoch("u0", mission_s=at_s), counter, incarnation=9)
-        watcher.happen(MessageReceived(said, waited_s))
+        watcher.happen(MessageReceived(said, watcher.now_s - waited_s))
 
     assert watcher.core.memory(140.0).mission_s == 42.0
 

@@ -215,7 +215,7 @@ def test_who_heard_of_the_start_late_is_put_right_by_the_next_announcement() -> 
 def test_what_an_announcement_has_waited_here_makes_it_no_earlier() -> None:
     observer = Onlooker()
     said = observer.statement(COORDINATOR, epoch("u0", "u1", mission_s=4.0))
-    observer.happen(MessageReceived(said, waited_s=0.75), 10.0)
+    observer.happen(MessageReceived(said, arrived_s=200.0), 0.75)
     assert observer.mission_state.mission_s(observer.now_s) == 4.75
 
 

@@ -267,6 +267,17 @@ def test_who_is_astray_near_the_border_has_left_a_zone_when_it_is_outside_by_all
     assert [each for each, _ in complaints] == ([] if is_sound else ["in a zone"])
 
 
+@pytest.mark.parametrize("begins_m", [91.0, 94.0])
+def test_who_is_just_inside_when_it_hears_may_come_farther_in_before_it_leaves(
+    begins_m: float,
+) -> None:
+    """Astray by what is forgiven it was outside by no belief of its own."""
+    world = on_a_way((0, begins_m, 0), (25, begins_m, 0), (25.05, 94.5, 0), (25.08, 85, 0))
+    complaints = FieldJudge(world, astray_m=3.0).complaints([DRAWN])
+
+    assert complaints == []
+
+
 @pytest.mark.parametrize(
     ("out_s", "uav", "flaws", "is_sound"),
     [

@@ -34,6 +34,7 @@ from sim.fleet.layout import (
 )
 from sim.fleet.passthrough import PassthroughOptions
 from swarm.bus.config import ClientTopology, MeshTopology
+from swarm.model import UavId
 from swarm.model.ids import COORDINATOR
 from swarm.model.layers import FlightLayers
 from swarm.protocol.timing import LinkKind
@@ -181,12 +182,13 @@ def test_the_first_of_a_large_simulated_fleet_wait_for_the_last() -> None:
 
 
 def test_those_that_are_told_the_same_share_a_process_and_the_highest_start_first() -> None:
+    seven = mission([uav(f"u{number}") for number in range(7)], [])
     places = [VehiclePlace(f"u{number}", f"tcp:127.0.0.1:{number}", number) for number in range(7)]
     other = PassthroughOptions(command={"u3": CommandStyle.MISSION})
     sharing = replace(OPTIONS, bus=BusKind.ROUTER, agents_per_process=3)
 
     def groups(options: LaunchOptions) -> list[str]:
-        found = agent_groups(places, options)
+        found = agent_groups(places, seven, options)
         assert sorted(place.system_id for group in found for place in group) == list(range(7))
         return [" ".join(place.uav for place in group) for group in found]
 
@@ -206,6 +208,11 @@ def test_who_begins_highest_starts_first_wherever_it_is_in_the_mission() -> None
     assert len(rising) == 30
     assert rising == sorted(rising)
     assert rising[0] < rising[-1]
+
+    places = [VehiclePlace(each.id, "tcp:127.0.0.1:1", 1) for each in shared.uavs]
+    together = replace(OPTIONS, bus=BusKind.ROUTER, agents_per_process=10)
+    first, *_ = zip(*agent_groups(places, shared, together), strict=True)
+    assert [heights_m[UavId(place.uav)] for place in first] == rising[:-4:-1]
 
 
 def test_a_process_of_several_agents_is_told_of_each() -> None:
