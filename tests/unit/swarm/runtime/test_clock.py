@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from swarm.runtime.clock import ScaledClock, SystemClock, incarnation, unix_s
+from swarm.runtime.clock import ScaledClock, SystemClock, elapsed_s, incarnation, unix_s
 
 
 @pytest.mark.parametrize("clock", [SystemClock(), ScaledClock(50.0)], ids=["system", "scaled"])
@@ -32,6 +32,11 @@ def test_waiting_takes_less_wall_time_on_a_faster_clock() -> None:
     assert SystemClock().wall_delay_s(6.0) == 6.0
     assert ScaledClock(3.0).wall_delay_s(6.0) == 2.0
     assert ScaledClock(0.5).wall_delay_s(6.0) == 12.0
+
+
+def test_a_faster_clock_advances_farther_in_the_same_wall_time() -> None:
+    assert elapsed_s(SystemClock(), 0.5) == 0.5
+    assert elapsed_s(ScaledClock(4.0), 0.5) == 2.0
 
 
 @pytest.mark.parametrize("speedup", [0.0, -1.0, math.inf, math.nan])
