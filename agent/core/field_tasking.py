@@ -390,6 +390,8 @@ class FieldTasking(Tasking):
         if claim is None or task is None or not (works and self._in_field):
             return
         if not self._limits.lasts(task, claim):
+            # What is measured in flight may never show where it decides: not again at once.
+            self._refused.add(task.task, now_s, passes=True)
             self._release("its battery does not last", now_s)
         elif state is AgentState.FLYING:
             self._attempt.too_late_at_s = self._limits.too_late_at_s(task, claim, now_s)

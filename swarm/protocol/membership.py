@@ -134,6 +134,7 @@ class Membership:
         """The own link came up or went down."""
         if up and not self._linked:
             self._grant_grace(now_s)
+            self._interrupted |= self.present  # any token may be a new process's now
         self._linked = up
 
     def held_up(self, now_s: float) -> None:

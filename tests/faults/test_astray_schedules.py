@@ -46,6 +46,9 @@ BROKEN_ONCE = {
     27000101: "who had left its slot told so, and then that it held it all along",
     29003951: "who had left its slot to others told that it held it when it asked for its way up",
     28003719: "who waited for its way and was begun anew took it for its own",
+    24000293: "who turned back for its battery set off for the same line again and again",
+    30004993: "who turned back for its battery set off for the same task again and again",
+    30006611: "who was begun anew during a cut was told by nobody what it had claimed",
     5000447: "who decided anew in a new zone waited there anew before it landed",
 }
 

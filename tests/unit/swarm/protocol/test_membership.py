@@ -157,13 +157,18 @@ def test_words_of_someone_whose_token_is_gone_do_not_make_it_steady(members: Mem
     assert members.steady == set()
 
 
-def test_a_cut_of_the_own_link_makes_nobody_forget(members: Membership) -> None:
-    """Else the whole fleet would answer for the whole fleet whenever a router restarts."""
+def test_after_a_cut_of_the_own_link_anyone_may_be_new_until_it_has_spoken(
+    members: Membership,
+) -> None:
+    """It may have begun anew meanwhile, and would be told by nobody what it had claimed."""
     members.link(False, 0.0)
     members.gone("u1", 0.0)
     members.link(True, 1.0)
     members.seen("u1", 1.0)
 
+    assert members.present == members.credible == {"u1"}
+    assert members.steady == set()
+    members.spoke("u1")
     assert members.steady == {"u1"}
 
 
