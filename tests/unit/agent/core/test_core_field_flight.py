@@ -313,6 +313,8 @@ def test_a_task_that_the_battery_does_not_last_for_is_given_up(script: Script) -
 
     assert agent.state() is AgentState.IDLE
     assert script.turns[-1].sortie_end_s == pytest.approx(200.0)
+    # With a full battery it may last by all that is known there: it is not tried again at once.
+    assert script.turns[-1].excluded == {"t0"}
 
 
 def test_with_nothing_to_do_it_goes_to_the_nearest_base_in_time(script: Script) -> None:
