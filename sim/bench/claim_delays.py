@@ -1,8 +1,9 @@
 """How long after the end of a service others hear what its UAV does next.
 
 The way of a decision from end to end: the agent is woken, decides, claims and publishes, and
-somebody on the bus takes it in. Where a UAV has to wait for its way, it says so in that claim, and
-flies later: the wait is no part of the decision. Leaves out: who finds nothing to do at first.
+it comes to the process of somebody on the bus. Where a UAV has to wait for its way, it says so in
+that claim, and flies later: the wait is no part of the decision. Leaves out: who finds nothing to
+do at first.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ class ClaimDelays:
         """By UAV, when its last service was over: outcomes are said again and again."""
 
     def hear(self, message: Message, mission_s: float | None) -> None:
-        """The observer hears that at a mission time [s], None: the mission has not begun."""
+        """That came to the observer at a mission time [s], None: the mission has not begun."""
         match message.body:
             case Outcome(completed_s=ended_s):
                 if ended_s > self._ended_s.get(message.writer, -math.inf):

@@ -101,7 +101,7 @@ class ScaleRun:
     """From each arrival, or end of service, until the next target was sent; of UAVs that keep apart
     nobody times it."""
     told_ms: tuple[float, ...]
-    """From each end of service until an observer has heard what the UAV claims next."""
+    """From each end of service until what the UAV claims next has come to an observer's process."""
     lost: int
     """UAVs that the observer took for lost, though no process had ended."""
     ended: int
@@ -321,7 +321,8 @@ class MessageCount:
         """Count it, if it is a message."""
         if isinstance(what, MessageReceived):
             said, state = what.message, self._mission_state
-            self.claim_delays.hear(said, None if state is None else state.mission_s(now_s))
+            came_s = now_s if what.arrived_s is None else what.arrived_s  # it is looked at later
+            self.claim_delays.hear(said, None if state is None else state.mission_s(came_s))
             self.heard[said.writer != COORDINATOR, NAMES[type(said.body)]] += 1
             if isinstance(said.body, Status):
                 self.there.add(said.writer)

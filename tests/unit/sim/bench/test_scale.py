@@ -100,7 +100,8 @@ def test_messages_of_uavs_and_of_the_coordinator_are_counted_apart() -> None:
     assert heard == {"claim": pytest.approx(0.05), "epoch": pytest.approx(0.1)}
 
 
-def test_a_decision_is_timed_until_an_observer_has_heard_what_is_claimed_next() -> None:
+def test_a_decision_is_timed_until_what_is_claimed_next_has_come_to_an_observer() -> None:
+    """Whose process looks at what has come a little later."""
     count = MessageCount()
     state = MissionState(mission([uav("u0"), uav("u1")], [task("t0", 1.0)]), TIMING)
     core = count.around(state, state)
@@ -118,8 +119,8 @@ def test_a_decision_is_timed_until_an_observer_has_heard_what_is_claimed_next() 
         (110.0, "u0", done("t0", completed_s=5.0)),  # said again
         (130.0, "u0", replace(held("t4", 29.9), phase=ClaimPhase.PROPOSED)),
     ]
-    for number, (now_s, writer, body) in enumerate(facts, 1):
-        core.step(MessageReceived(message(writer, body, number)), now_s)
+    for number, (came_s, writer, body) in enumerate(facts, 1):
+        core.step(MessageReceived(message(writer, body, number), came_s), came_s + 0.005)
 
     assert count.claim_delays.told_ms == [pytest.approx(30.0)]
 
