@@ -17,8 +17,8 @@ CPU_FRAC_SHARED: Final = 0.0075
 CPU_FRAC_APART: Final = 0.034
 """The same of one that keeps a separation, with a process of its own: 30 take 1.0 processors, 50
 take 1.53."""
-CPU_FRAC_APART_SHARED: Final = 0.0155
-"""And where they share processes: 100 of them take 1.33 to 1.48 processors."""
+CPU_FRAC_APART_SHARED: Final = 0.0125
+"""And where they share processes: 100 of them take 1.23 processors, 200 take 1.8 to 2.0."""
 MANY: Final = 10
 BYTES_PER_UAV: Final = 45 * 10**6
 """Of an agent (26 MB) and an autopilot of its own (18 MB), shares of common pages included."""
