@@ -35,6 +35,8 @@ class Membership:
         self._mute: set[str] = set()
         """Lost by silence, with a living token."""
         self._interrupted: set[str] = set()
+        """Who may have begun anew since it last said what it claims: its token went, or the own
+        link was down."""
         self._ghosts: set[str] = set()
         self.present: set[str] = set()
         """Writers believed to be there."""
@@ -56,7 +58,8 @@ class Membership:
     def steady(self) -> set[str]:
         """Writers that are there and remember all they ever said, so answer for themselves.
 
-        A token that went and came back may be a new process's, which must be told.
+        A token that went and came back, or was there before the own link was down, may be a new
+        process's, which must be told.
         """
         return self.present - self._interrupted
 
